@@ -1,0 +1,203 @@
+//! What the commands need: where it is looked for, and how it is installed when missing.
+//!
+//! Programs from crates.io go to a folder of their own in the user's cache, shared by all checkouts, so
+//! that no other version a user has is replaced. A program already on PATH with the right version is
+//! preferred. System packages come from apt; on another system one sentence says what to install.
+
+use std::ffi::OsString;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::time::Instant;
+
+use crate::steps::say;
+use crate::{Failure, program, root, run, run_command};
+
+const TRUNK: &str = "0.21.14";
+const WASM_PACK: &str = "0.15.1";
+
+#[derive(Clone, Copy)]
+pub enum Tool {
+    WasmTarget,
+    Trunk,
+    WasmBindgen,
+    WasmPack,
+    WasmOpt,
+    Chromium,
+    Node,
+    NodePackages,
+}
+
+/// What building and serving the page needs.
+pub const PAGE: [Tool; 3] = [Tool::WasmTarget, Tool::Trunk, Tool::WasmBindgen];
+
+/// What the tests need.
+pub const ALL: [Tool; 7] =
+    [Tool::WasmTarget, Tool::Trunk, Tool::WasmBindgen, Tool::WasmPack, Tool::Chromium, Tool::Node, Tool::NodePackages];
+
+pub fn install(tools: &[Tool]) -> Result<(), Failure> {
+    tools.iter().try_for_each(|tool| match tool {
+        Tool::WasmTarget => wasm_target(),
+        Tool::Trunk => cargo_program("trunk", "trunk", TRUNK, true, "6 minutes"),
+        // Without --locked: the lock file it was published with names a withdrawn crate.
+        Tool::WasmBindgen => {
+            cargo_program("wasm-bindgen-cli", "wasm-bindgen", &locked_wasm_bindgen()?, false, "2 minutes")
+        }
+        Tool::WasmPack => cargo_program("wasm-pack", "wasm-pack", WASM_PACK, true, "3 minutes"),
+        Tool::WasmOpt => {
+            node()?;
+            npm_ci("web")
+        }
+        Tool::Chromium => chromium_and_driver(),
+        Tool::Node => node(),
+        Tool::NodePackages => npm_ci("tests/e2e"),
+    })
+}
+
+/// Where our own copies of cargo programs live.
+fn home() -> PathBuf {
+    let cache = std::env::var_os("XDG_CACHE_HOME").map(PathBuf::from);
+    let user = std::env::var_os("HOME").or_else(|| std::env::var_os("USERPROFILE")).map(PathBuf::from);
+    cache.or(user.map(|user| user.join(".cache"))).unwrap_or_else(|| root().join("target")).join("ape-lab")
+}
+
+/// PATH with our own programs first.
+pub fn path() -> OsString {
+    let old = std::env::var_os("PATH").unwrap_or_default();
+    let folders = std::iter::once(home().join("bin")).chain(std::env::split_paths(&old));
+    std::env::join_paths(folders).unwrap_or(old)
+}
+
+fn find(name: &str) -> Option<PathBuf> {
+    std::env::split_paths(&path()).map(|folder| folder.join(name)).find(|file| file.is_file())
+}
+
+/// What a program prints, or nothing when it cannot be run.
+fn output(name: &str, arguments: &[&str]) -> Option<String> {
+    let output = program(name, arguments).stderr(Stdio::null()).output().ok()?;
+    output.status.success().then(|| String::from_utf8_lossy(&output.stdout).trim().to_owned())
+}
+
+fn wasm_target() -> Result<(), Failure> {
+    const TARGET: &str = "wasm32-unknown-unknown";
+    let sysroot =
+        output("rustc", &["--print", "sysroot"]).ok_or("rustc is missing: install Rust from https://rustup.rs")?;
+    if Path::new(&sysroot).join("lib/rustlib").join(TARGET).is_dir() {
+        return Ok(());
+    }
+    say("adding the wasm target to Rust (seconds)");
+    run("rustup", &["target", "add", TARGET])
+        .map_err(|failure| format!("{failure}; without rustup, install the {TARGET} target of your Rust by hand"))
+}
+
+/// The version of wasm-bindgen in Cargo.lock: the command must be the very same.
+fn locked_wasm_bindgen() -> Result<String, Failure> {
+    let lock = std::fs::read_to_string(root().join("Cargo.lock")).map_err(|error| format!("Cargo.lock: {error}"))?;
+    let mut lines = lock.lines();
+    lines
+        .find(|line| *line == "name = \"wasm-bindgen\"")
+        .and_then(|_| lines.next()?.strip_prefix("version = \"")?.strip_suffix('"'))
+        .map(str::to_owned)
+        .ok_or_else(|| "Cargo.lock does not name the version of wasm-bindgen".to_owned())
+}
+
+fn cargo_program(package: &str, name: &str, version: &str, locked: bool, usual: &str) -> Result<(), Failure> {
+    let is_there =
+        || output(name, &["--version"]).is_some_and(|line| line.split_whitespace().any(|word| word == version));
+    if is_there() {
+        return Ok(());
+    }
+    let wanted = format!("{package}@{version}");
+    let home = home();
+    let home_text = home.to_string_lossy();
+    let start = Instant::now();
+    if find("cargo-binstall").is_some() {
+        say(&format!("installing {wanted} with cargo binstall (seconds)"));
+        if run("cargo", &["binstall", "--no-confirm", "--root", &home_text, &wanted]).is_ok() && is_there() {
+            return Ok(());
+        }
+    }
+    say(&format!("compiling {wanted} into {home_text} (about {usual} on two cores, once)"));
+    let mut arguments = vec!["install", "--quiet", "--root", &home_text, &wanted];
+    if locked {
+        arguments.push("--locked");
+    }
+    let mut command = program("cargo", &arguments);
+    // One target folder for all of them: what they have in common is compiled once. Little optimised, as
+    // they are used for seconds and compiled for minutes.
+    command
+        .env("CARGO_TARGET_DIR", home.join("build"))
+        .env("CARGO_PROFILE_RELEASE_OPT_LEVEL", "1")
+        .env("CARGO_PROFILE_RELEASE_LTO", "off")
+        .env("CARGO_PROFILE_RELEASE_CODEGEN_UNITS", "16");
+    run_command(command).map_err(|failure| format!("{failure}; by hand: cargo install {wanted}"))?;
+    println!("{wanted} took {:.0} s", start.elapsed().as_secs_f64());
+    if is_there() { Ok(()) } else { Err(format!("{name} was installed but does not say it is {version}")) }
+}
+
+fn is_root() -> bool {
+    output("id", &["-u"]).as_deref() == Some("0")
+}
+
+/// Installs Debian packages, or says in one sentence what is missing.
+fn apt(packages: &[&str], why: &str) -> Result<(), Failure> {
+    let by_hand = format!("{why}; by hand: apt-get install {}", packages.join(" "));
+    if find("apt-get").is_none() {
+        return Err(format!(
+            "{why}, and this system has no apt-get: install {} the way your system does",
+            packages.join(" and ")
+        ));
+    }
+    say(&format!("installing {} with apt-get (about 15 seconds)", packages.join(", ")));
+    let apt = |arguments: &[&str]| {
+        let mut command = if is_root() {
+            program("apt-get", arguments)
+        } else {
+            program("sudo", &[&["apt-get"], arguments].concat())
+        };
+        command.env("DEBIAN_FRONTEND", "noninteractive");
+        run_command(command).map_err(|failure| format!("{failure}: {by_hand}"))
+    };
+    apt(&["update", "-qq"])?;
+    apt(&[&["install", "-y", "-qq", "--no-install-recommends"], packages].concat())
+}
+
+const CHROMIUM: [&str; 4] = ["chromium", "chromium-browser", "google-chrome", "google-chrome-stable"];
+
+/// A Chromium or Chrome on PATH.
+pub fn chromium() -> Result<PathBuf, Failure> {
+    let found = CHROMIUM.iter().find_map(|name| find(name));
+    found.ok_or_else(|| "Chromium is missing although it was just looked for".to_owned())
+}
+
+pub fn chromedriver() -> Result<PathBuf, Failure> {
+    find("chromedriver").ok_or_else(|| "chromedriver is missing although it was just looked for".to_owned())
+}
+
+fn chromium_and_driver() -> Result<(), Failure> {
+    if chromium().is_ok() && chromedriver().is_ok() {
+        return Ok(());
+    }
+    apt(&["chromium", "chromium-driver"], "the browser tests need Chromium and its driver")
+}
+
+fn node() -> Result<(), Failure> {
+    let major = output("node", &["--version"])
+        .and_then(|line| line.trim_start_matches('v').split('.').next()?.parse::<u32>().ok());
+    if major.is_some_and(|major| major >= 18) && find("npm").is_some() {
+        return Ok(());
+    }
+    apt(&["nodejs", "npm"], "the browser tests need Node.js 18 or later and npm")
+}
+
+/// Node packages as a lock file names them, installed again when the lock file changed.
+fn npm_ci(folder: &str) -> Result<(), Failure> {
+    let folder = root().join(folder);
+    let modified = |file: &str| std::fs::metadata(folder.join(file)).and_then(|data| data.modified()).ok();
+    if modified("node_modules/.package-lock.json") >= modified("package-lock.json") {
+        return Ok(());
+    }
+    say(&format!("installing the node packages of {} (seconds)", folder.display()));
+    let mut command = Command::new("npm");
+    command.args(["ci", "--no-audit", "--no-fund", "--silent"]).current_dir(&folder).env("PATH", path());
+    run_command(command)
+}
