@@ -1,1 +1,22 @@
+//! ape-lab: adversarial policy ensembles (Zhan, Tiomkin & Abbeel 2019), exact, live and in the browser.
+//!
+//! The rooms, lower ones first; none imports one that stands below it in this list:
+//!
+//! - [`mdp`]: gridworlds, stationary policies, their exact returns. Knows nothing of ensembles.
+//! - [`ape`]: ensembles, who an observer takes the actor to be, and PG-APE, which trains them.
+//! - [`experiment`]: presets, and the figures of an ensemble as the paper reports them.
+//! - [`lab`]: a training session as a state machine with messages in and out, and a thread to run it.
+//! - [`ui`]: the page, in egui and nothing else.
+//! - [`web`]: what only a browser has: the worker, the mirror of the page for assistive technology.
+//!
+//! The programs in `src/bin` are thin: `app` (the page, or a window), `worker` (the browser's worker) and
+//! `ape` (the command line).
 
+pub mod ape;
+pub mod experiment;
+pub mod lab;
+pub mod mdp;
+//#[cfg(feature = "page")]
+//pub mod ui;
+//#[cfg(target_arch = "wasm32")]
+//pub mod web;

@@ -1,0 +1,135 @@
+//! Every knob of PG-APE, with the paper's value and unit.
+
+use serde::{Deserialize, Serialize};
+
+use super::fields::{ConfigError, FIELDS};
+use super::observer::ObserverChoice;
+
+/// How the clone's trajectories push the experts (paper, appendix "Estimating ∇ log π_o").
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum GradientKind {
+    /// ∇ log π_c(a|s) of the context that was drawn with the action. The paper's choice.
+    SampledContext,
+    /// ∇ log Σ_c p(c|s) π_c(a|s): every expert by its responsibility for the action.
+    Mixture,
+}
+
+/// What the advantage is measured against.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum BaselineKind {
+    /// One table Ṽ_c(s), fitted to R on τ₁ and to −βR on τ₂ (the paper's loss for φ).
+    Joint,
+    /// A table for the experts and one for the clone: less variance.
+    Separate,
+}
+
+/// The return that follows a step.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ReturnToGo {
+    /// R(t) = Σ_{t' ≥ t} γ^{t' − t} r.
+    FromStep,
+    /// R(t) = Σ_{t' ≥ t} γ^{t'} r: the exact gradient of the discounted return (paper, section 2.2).
+    FromStart,
+}
+
+/// The configuration of a training run. Fields left out of a file take the default.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Config {
+    /// n, number of experts, 1..=8 (paper: 2).
+    pub experts: u32,
+    /// β, weight of the clone's return in the objective, 0..=2 (paper: 0.6).
+    pub beta: f64,
+    /// Who the clone is thought to be: `p(c|s)` (paper: `replay(60)`).
+    pub observer: ObserverChoice,
+    /// Estimator of the clone's gradient (paper: `sampled_context`).
+    pub gradient: GradientKind,
+    /// Adam's step size, of policies and baselines alike (paper: 0.05).
+    pub learning_rate: f64,
+    /// Weight of the baseline's loss (paper: 0.5).
+    pub value_weight: f64,
+    /// What the advantage is measured against (paper: `joint`).
+    pub baseline: BaselineKind,
+    /// Weight of the entropy bonus at the first update, falling linearly (paper: 0.5).
+    pub entropy_start: f64,
+    /// Weight of the entropy bonus at the last update (paper: 0.005).
+    pub entropy_end: f64,
+    /// γ, 0..=1 (paper: 0.99).
+    pub discount: f64,
+    /// Whether discounting counts from the step or from the start of the episode (paper: both are written).
+    pub return_to_go: ReturnToGo,
+    /// T, longest episode in steps (paper: 100).
+    pub horizon: u32,
+    /// Whole episodes are played until at least this many steps, for τ₁ and again for τ₂ (paper: 4096).
+    pub batch_steps: u32,
+    /// Steps of τ₁ in a whole run; divided by `batch_steps` it gives the updates (paper: 3,000,000).
+    pub total_steps: u32,
+    /// Everything random comes from it.
+    pub seed: u32,
+}
+
+impl Default for Config {
+    fn default() -> Self {
+        Config {
+            experts: 2,
+            beta: 0.6,
+            observer: ObserverChoice::UNIFORM,
+            gradient: GradientKind::SampledContext,
+            learning_rate: 0.05,
+            value_weight: 0.5,
+            baseline: BaselineKind::Separate,
+            entropy_start: 0.5,
+            entropy_end: 0.005,
+            discount: 0.99,
+            return_to_go: ReturnToGo::FromStep,
+            horizon: 100,
+            batch_steps: 4096,
+            total_steps: 3_000_000,
+            seed: 1,
+        }
+    }
+}
+
+impl Config {
+    /// Most experts an ensemble may have.
+    pub const MAX_EXPERTS: u32 = 8;
+    pub const MAX_BETA: f64 = 2.0;
+
+    /// The paper's literal configuration where it differs from our default (see docs/METHOD.md).
+    pub fn paper() -> Config {
+        Config { observer: ObserverChoice::PAPER, baseline: BaselineKind::Joint, ..Config::default() }
+    }
+
+    /// Number of updates of a whole run (paper: 732).
+    pub fn updates(&self) -> u32 {
+        (self.total_steps / self.batch_steps).max(1)
+    }
+
+    /// Checks every range.
+    pub fn check(&self) -> Result<(), ConfigError> {
+        FIELDS.iter().try_for_each(|field| field.check(self))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_default_runs_for_the_papers_732_updates() {
+        assert_eq!(Config::default().updates(), 732);
+        assert_eq!(Config::default().check(), Ok(()));
+    }
+
+    #[test]
+    fn a_field_out_of_range_is_named_with_its_range() {
+        let error = Config { beta: 3.0, ..Config::default() }.check().unwrap_err();
+        assert_eq!(error.to_string(), "beta 3: must be a number from 0 to 2");
+        let error = Config { experts: 9, ..Config::default() }.check().unwrap_err();
+        assert_eq!(error.to_string(), "experts 9: must be a whole number from 1 to 8");
+        assert!(Config { discount: f64::NAN, ..Config::default() }.check().is_err());
+    }
+}

@@ -1,0 +1,151 @@
+//! An ensemble of experts, its clone, and the file that holds it.
+
+use serde::{Deserialize, Serialize};
+
+use super::Config;
+use crate::mdp::{ACTIONS, Grid, GridError, GridSpec, Policy, PolicyError};
+
+/// n experts; one of them, drawn uniformly, acts for a whole episode.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Ensemble {
+    policies: Vec<Policy>,
+}
+
+impl Ensemble {
+    /// `policies`: at least one, all for the same grid.
+    pub fn new(policies: Vec<Policy>) -> Ensemble {
+        Ensemble { policies }
+    }
+
+    pub fn policies(&self) -> &[Policy] {
+        &self.policies
+    }
+
+    /// n.
+    pub fn experts(&self) -> usize {
+        self.policies.len()
+    }
+
+    /// π_o(a|s) = Σ_c p(c|s) π_c(a|s) (paper, Eq. 1): what an observer ends up with.
+    pub fn cloned(&self, contexts: &Contexts) -> Policy {
+        let row = |state: usize| {
+            let mut mixed = [0.0; ACTIONS];
+            for (policy, &p) in self.policies.iter().zip(contexts.row(state)) {
+                for (sum, action) in mixed.iter_mut().zip(policy.row(state)) {
+                    *sum += p * action;
+                }
+            }
+            mixed
+        };
+        Policy::from_rows((0..self.policies[0].rows().len()).map(row).collect())
+    }
+}
+
+/// p(c|s): for every cell, the probability of each expert to have acted there.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Contexts {
+    experts: usize,
+    /// `[S][n]`.
+    p: Vec<f64>,
+}
+
+impl Contexts {
+    /// 1/n everywhere.
+    pub fn equal(cells: usize, experts: usize) -> Contexts {
+        Contexts { experts, p: vec![1.0 / experts as f64; cells * experts] }
+    }
+
+    /// Proportional to `weight(state, context)`; 1/n where all weights are 0.
+    pub fn from_weights(cells: usize, experts: usize, weight: impl Fn(usize, usize) -> f64) -> Contexts {
+        let mut p = Vec::with_capacity(cells * experts);
+        for state in 0..cells {
+            let sum: f64 = (0..experts).map(|context| weight(state, context)).sum();
+            p.extend((0..experts).map(
+                |context| {
+                    if sum > 0.0 { weight(state, context) / sum } else { 1.0 / experts as f64 }
+                },
+            ));
+        }
+        Contexts { experts, p }
+    }
+
+    /// p(·|s), `[n]`.
+    pub fn row(&self, state: usize) -> &[f64] {
+        &self.p[state * self.experts..][..self.experts]
+    }
+
+    /// `[S][n]`, row by row.
+    pub fn as_slice(&self) -> &[f64] {
+        &self.p
+    }
+}
+
+/// An ensemble as a file: `{"format":"ape-ensemble","version":1,"grid":…,"experts":[[[p;5];S];n]}`, with the
+/// configuration that made it where there is one. Other fields are ignored.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct EnsembleFile {
+    pub format: String,
+    pub version: u32,
+    pub grid: GridSpec,
+    /// `[n][S][5]`; rows of walls mean nothing.
+    pub experts: Vec<Vec<[f64; ACTIONS]>>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub config: Option<Config>,
+}
+
+/// Why a file holds no ensemble.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum EnsembleError {
+    #[error(
+        "not an ensemble file: {0}; expected {{\"format\": \"ape-ensemble\", \"version\": 1, \"grid\": …, \"experts\": …}}"
+    )]
+    Json(String),
+    #[error("format {0:?}: must be \"ape-ensemble\"")]
+    Format(String),
+    #[error("version {0}: this program reads version 1")]
+    Version(u32),
+    #[error("grid: {0}")]
+    Grid(#[from] GridError),
+    #[error("{0} experts: must be from 1 to {max}", max = Config::MAX_EXPERTS)]
+    Experts(usize),
+    #[error("expert {expert}: {error}")]
+    Policy { expert: usize, error: PolicyError },
+}
+
+impl EnsembleFile {
+    const FORMAT: &str = "ape-ensemble";
+
+    pub fn new(grid: &Grid, ensemble: &Ensemble, config: Option<Config>) -> EnsembleFile {
+        EnsembleFile {
+            format: Self::FORMAT.to_owned(),
+            version: 1,
+            grid: grid.spec().clone(),
+            experts: ensemble.policies().iter().map(|policy| policy.rows().to_vec()).collect(),
+            config,
+        }
+    }
+
+    /// Reads the JSON text of a file; [`EnsembleFile::check`] then says whether it makes sense.
+    pub fn parse(text: &str) -> Result<EnsembleFile, EnsembleError> {
+        serde_json::from_str(text).map_err(|error| EnsembleError::Json(error.to_string()))
+    }
+
+    /// The grid and the ensemble, when everything about them is valid.
+    pub fn check(self) -> Result<(Grid, Ensemble), EnsembleError> {
+        if self.format != Self::FORMAT {
+            return Err(EnsembleError::Format(self.format));
+        }
+        if self.version != 1 {
+            return Err(EnsembleError::Version(self.version));
+        }
+        let grid = Grid::new(self.grid)?;
+        if self.experts.is_empty() || self.experts.len() > Config::MAX_EXPERTS as usize {
+            return Err(EnsembleError::Experts(self.experts.len()));
+        }
+        let policy = |(index, rows)| {
+            Policy::new(&grid, rows).map_err(|error| EnsembleError::Policy { expert: index + 1, error })
+        };
+        let policies: Vec<Policy> = self.experts.into_iter().enumerate().map(policy).collect::<Result<_, _>>()?;
+        Ok((grid, Ensemble::new(policies)))
+    }
+}

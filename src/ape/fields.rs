@@ -1,0 +1,273 @@
+//! The table of [`Config`]'s fields: names, ranges, the paper's values and a sentence about each.
+//!
+//! Checking, the command line's flags and the page's controls all read it.
+
+use super::observer::{OBSERVERS, ObserverChoice};
+use super::{BaselineKind, Config, GradientKind, ReturnToGo};
+
+/// One field of [`Config`].
+pub struct Field {
+    /// As in files and, with dashes, on the command line.
+    pub name: &'static str,
+    /// As on the page.
+    pub label: &'static str,
+    /// The paper's value, as text.
+    pub paper: &'static str,
+    pub help: &'static str,
+    pub kind: Kind,
+}
+
+/// How a field is read, written and limited.
+pub enum Kind {
+    Real {
+        low: f64,
+        high: f64,
+        get: fn(&Config) -> f64,
+        set: fn(&mut Config, f64),
+    },
+    Whole {
+        low: u32,
+        high: u32,
+        get: fn(&Config) -> u32,
+        set: fn(&mut Config, u32),
+    },
+    /// A word; `options` are those to choose from.
+    Word {
+        options: fn() -> Vec<String>,
+        get: fn(&Config) -> String,
+        set: fn(&mut Config, &str) -> bool,
+    },
+}
+
+/// A field outside its range.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("{field} {value}: must be {expected}")]
+pub struct ConfigError {
+    pub field: &'static str,
+    pub value: String,
+    pub expected: String,
+}
+
+impl Field {
+    pub fn find(name: &str) -> Option<&'static Field> {
+        FIELDS.iter().find(|field| field.name == name)
+    }
+
+    /// What a value must be.
+    pub fn expected(&self) -> String {
+        match &self.kind {
+            Kind::Real { low, high, .. } => format!("a number from {low} to {high}"),
+            Kind::Whole { low, high, .. } => format!("a whole number from {low} to {high}"),
+            Kind::Word { options, .. } => format!("one of {}", options().join(", ")),
+        }
+    }
+
+    fn error(&self, value: impl ToString) -> ConfigError {
+        ConfigError { field: self.name, value: value.to_string(), expected: self.expected() }
+    }
+
+    /// Whether the field's value in `config` lies in its range.
+    pub fn check(&self, config: &Config) -> Result<(), ConfigError> {
+        match &self.kind {
+            Kind::Real { low, high, get, .. } => {
+                let value = get(config);
+                if (*low..=*high).contains(&value) { Ok(()) } else { Err(self.error(value)) }
+            }
+            Kind::Whole { low, high, get, .. } => {
+                let value = get(config);
+                if (*low..=*high).contains(&value) { Ok(()) } else { Err(self.error(value)) }
+            }
+            Kind::Word { .. } => Ok(()),
+        }
+    }
+
+    /// Sets the field from text and checks it.
+    pub fn set(&self, config: &mut Config, text: &str) -> Result<(), ConfigError> {
+        let is_read = match &self.kind {
+            Kind::Real { set, .. } => text.parse().map(|value| set(config, value)).is_ok(),
+            Kind::Whole { set, .. } => text.parse().map(|value| set(config, value)).is_ok(),
+            Kind::Word { set, .. } => set(config, text),
+        };
+        if is_read { self.check(config) } else { Err(self.error(text)) }
+    }
+
+    /// The field's value as text.
+    pub fn text(&self, config: &Config) -> String {
+        match &self.kind {
+            Kind::Real { get, .. } => get(config).to_string(),
+            Kind::Whole { get, .. } => get(config).to_string(),
+            Kind::Word { get, .. } => get(config),
+        }
+    }
+}
+
+macro_rules! real {
+    ($field:ident, $low:expr, $high:expr) => {
+        Kind::Real { low: $low, high: $high, get: |config| config.$field, set: |config, value| config.$field = value }
+    };
+}
+
+macro_rules! whole {
+    ($field:ident, $low:expr, $high:expr) => {
+        Kind::Whole { low: $low, high: $high, get: |config| config.$field, set: |config, value| config.$field = value }
+    };
+}
+
+macro_rules! word {
+    ($field:ident, $($text:literal => $value:expr),+) => {
+        Kind::Word {
+            options: || vec![$($text.to_owned()),+],
+            get: |config| match config.$field { $(value if value == $value => $text.to_owned(),)+ _ => unreachable!("every value has a word") },
+            set: |config, text| match text { $($text => { config.$field = $value; true })+ _ => false },
+        }
+    };
+}
+
+/// Every field, in the order of [`Config`].
+pub static FIELDS: [Field; 15] = [
+    Field {
+        name: "experts",
+        label: "Experts n",
+        paper: "2",
+        help: "Number of expert policies. One of them, drawn at random, acts for a whole episode.",
+        kind: whole!(experts, 1, Config::MAX_EXPERTS),
+    },
+    Field {
+        name: "beta",
+        label: "β",
+        paper: "0.6",
+        help: "Weight of the clone's return in J = E[ensemble] − β E[clone] (Eq. 3). At 0 the experts care only about the goal.",
+        kind: real!(beta, 0.0, Config::MAX_BETA),
+    },
+    Field {
+        name: "observer",
+        label: "Observer",
+        paper: "replay(60)",
+        help: "Who the experts take the cloner to be: how it guesses which expert acted at a cell, p(c|s) (Eq. 1).",
+        kind: Kind::Word {
+            options: || OBSERVERS.iter().zip(ObserverChoice::all()).map(|(_, choice)| choice.to_string()).collect(),
+            get: |config| config.observer.to_string(),
+            set: |config, text| text.parse().map(|observer| config.observer = observer).is_ok(),
+        },
+    },
+    Field {
+        name: "gradient",
+        label: "Clone gradient",
+        paper: "sampled_context",
+        help: "∇ log π_o by the one expert that was drawn with the action, or by every expert's responsibility for it (appendix).",
+        kind: word!(gradient, "sampled_context" => GradientKind::SampledContext, "mixture" => GradientKind::Mixture),
+    },
+    Field {
+        name: "learning_rate",
+        label: "Learning rate",
+        paper: "0.05",
+        help: "Step size of Adam, for policies and baselines.",
+        kind: real!(learning_rate, 0.0, 10.0),
+    },
+    Field {
+        name: "value_weight",
+        label: "Value weight",
+        paper: "0.5",
+        help: "Weight of the baseline's squared error (Eq. 4). Adam takes most of its effect away where baselines are tables of their own.",
+        kind: real!(value_weight, 0.0, 1000.0),
+    },
+    Field {
+        name: "baseline",
+        label: "Baseline",
+        paper: "joint",
+        help: "One table fitted to R on the ensemble's episodes and to −βR on the clone's (Eq. 4), or a table for each: less variance.",
+        kind: word!(baseline, "joint" => BaselineKind::Joint, "separate" => BaselineKind::Separate),
+    },
+    Field {
+        name: "entropy_start",
+        label: "Entropy bonus, first update",
+        paper: "0.5",
+        help: "Weight of the mean entropy of visited states at the first update; it then falls linearly.",
+        kind: real!(entropy_start, 0.0, 1000.0),
+    },
+    Field {
+        name: "entropy_end",
+        label: "Entropy bonus, last update",
+        paper: "0.005",
+        help: "Weight of the entropy bonus at the last update.",
+        kind: real!(entropy_end, 0.0, 1000.0),
+    },
+    Field {
+        name: "discount",
+        label: "Discount γ",
+        paper: "0.99",
+        help: "What a step's reward counts one step earlier.",
+        kind: real!(discount, 0.0, 1.0),
+    },
+    Field {
+        name: "return_to_go",
+        label: "Discount counts",
+        paper: "from_step",
+        help: "R(t) = Σ γ^(t'−t) r from the step on, as the paper's scale of Ṽ suggests; or Σ γ^t' r, as in its section 2.2, the exact gradient.",
+        kind: word!(return_to_go, "from_step" => ReturnToGo::FromStep, "from_start" => ReturnToGo::FromStart),
+    },
+    Field {
+        name: "horizon",
+        label: "Horizon T (steps)",
+        paper: "100",
+        help: "Longest episode, in steps.",
+        kind: whole!(horizon, 1, 10_000),
+    },
+    Field {
+        name: "batch_steps",
+        label: "Batch (steps)",
+        paper: "4096",
+        help: "Whole episodes are played until at least this many steps, with the ensemble and again with the clone.",
+        kind: whole!(batch_steps, 1, 1_000_000),
+    },
+    Field {
+        name: "total_steps",
+        label: "Run (ensemble steps)",
+        paper: "3000000",
+        help: "Length of a run in ensemble steps: divided by the batch it gives the number of updates, 732 in the paper.",
+        kind: whole!(total_steps, 1, u32::MAX),
+    },
+    Field {
+        name: "seed",
+        label: "Seed",
+        paper: "–",
+        help: "Everything random comes from it: the same seed gives the same run, to the last bit, in every browser and natively.",
+        kind: whole!(seed, 0, u32::MAX),
+    },
+];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The table names exactly the fields that a file has, and reads back what it writes.
+    #[test]
+    fn the_table_is_the_configuration() {
+        let json = serde_json::to_value(Config::default()).unwrap();
+        let mut names: Vec<&str> = FIELDS.iter().map(|field| field.name).collect();
+        names.sort_unstable();
+        assert_eq!(names, json.as_object().unwrap().keys().collect::<Vec<_>>());
+        let mut copy = Config { experts: 7, seed: 9, ..Config::paper() };
+        for field in &FIELDS {
+            field.set(&mut copy, &field.text(&Config::default())).unwrap();
+        }
+        assert_eq!(copy, Config::default());
+    }
+
+    #[test]
+    fn the_paper_column_is_the_papers_configuration() {
+        let mut config = Config::default();
+        for field in FIELDS.iter().filter(|field| field.paper != "–") {
+            field.set(&mut config, field.paper).unwrap();
+        }
+        assert_eq!(config, Config::paper());
+    }
+
+    #[test]
+    fn text_that_is_no_value_is_refused() {
+        let set = |name: &str, text: &str| Field::find(name).unwrap().set(&mut Config::default(), text);
+        assert_eq!(set("beta", "x").unwrap_err().to_string(), "beta x: must be a number from 0 to 2");
+        assert_eq!(set("experts", "2.5").unwrap_err().to_string(), "experts 2.5: must be a whole number from 1 to 8");
+        assert!(set("beta", "NaN").is_err() && set("observer", "nobody").is_err() && set("gradient", "").is_err());
+    }
+}

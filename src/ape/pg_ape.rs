@@ -1,0 +1,386 @@
+//! PG-APE: the paper's Algorithm 1, top to bottom.
+//!
+//! One update plays a batch of episodes with the ensemble (τ₁) and a batch with its clone (τ₂), and climbs
+//!
+//! J(θ) = E_{τ ~ π_c}[r(τ)] − β E_{τ ~ π_o}[r(τ)]                                   (paper, Eq. 3)
+//!
+//! once with Adam. Experts are tables of logits, θ[c][s][a]. As they are tables, the gradient needs nothing
+//! of a batch but how often each (context, state, action) was taken and the sum of the returns that followed:
+//! [`Tally`] is all that playing writes.
+
+use std::hash::Hasher;
+
+use rand::{Rng, RngExt, SeedableRng};
+use rand_xoshiro::Xoshiro256PlusPlus;
+
+use super::adam::Adam;
+use super::observer::Observer;
+use super::{BaselineKind, Config, ConfigError, Contexts, Ensemble, GradientKind, ReturnToGo};
+use crate::mdp::{ACTIONS, Draw, Grid, Policy, Starts};
+
+/// Outcomes of a draw among contexts.
+type ContextDraw = Draw<{ Config::MAX_EXPERTS as usize }>;
+
+/// A batch of episodes as far as learning needs it, per (context, state, action).
+struct Tally {
+    /// `[n][S][5]`: how often the action was taken.
+    count: Vec<u32>,
+    /// `[n][S][5]`: sum of the returns R(t) that followed.
+    returns: Vec<f64>,
+    episodes: u32,
+    steps: u32,
+}
+
+impl Tally {
+    fn new(entries: usize) -> Tally {
+        Tally { count: vec![0; entries], returns: vec![0.0; entries], episodes: 0, steps: 0 }
+    }
+
+    fn clear(&mut self) {
+        self.count.fill(0);
+        self.returns.fill(0.0);
+        (self.episodes, self.steps) = (0, 0);
+    }
+
+    /// Adds an episode's steps with the returns that followed them.
+    fn add_episode(&mut self, entries: &[u32], to_go: &[f64], weights: &[f64]) {
+        for (t, (&entry, weight)) in entries.iter().zip(weights).enumerate() {
+            self.count[entry as usize] += 1;
+            self.returns[entry as usize] += weight * to_go[entries.len() - t];
+        }
+        self.episodes += 1;
+        self.steps += entries.len() as u32;
+    }
+
+    /// Visits and returns of the pair (context, state) with this number, over its actions.
+    fn pair(&self, pair: usize) -> (f64, f64) {
+        let actions = pair * ACTIONS..(pair + 1) * ACTIONS;
+        let count: u32 = self.count[actions.clone()].iter().sum();
+        (f64::from(count), self.returns[actions].iter().sum())
+    }
+}
+
+/// A gradient estimate of J's two terms with entropy left out, for checks against exact derivatives.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Gradient {
+    /// `[n][S][5]`: G₁ + G₂ in the order of the logits.
+    pub logits: Vec<f64>,
+    /// p(c|s) while τ₂ was played.
+    pub contexts: Contexts,
+}
+
+/// A training run: the experts, their baselines, and all that an update needs.
+pub struct Trainer {
+    grid: Grid,
+    config: Config,
+    rng: Xoshiro256PlusPlus,
+    observer: Box<dyn Observer>,
+    /// θ, `[n][S][5]`.
+    logits: Vec<f64>,
+    /// φ. `joint`: Ṽ_c, `[n][S]`. `separate`: V_c, `[n][S]`, then V_o, `[S]`.
+    values: Vec<f64>,
+    logits_adam: Adam,
+    values_adam: Adam,
+    updates: u32,
+    /// Return that follows a step when k steps are left, counted from that step: `[T + 1]`.
+    to_go: Vec<f64>,
+    /// What the return after step t counts: γᵗ for `from_start`, 1 for `from_step`: `[T]`.
+    weights: Vec<f64>,
+    ensemble_tally: Tally,
+    clone_tally: Tally,
+    /// One episode: its cells and its entries in the tally.
+    path: Vec<u32>,
+    entries: Vec<u32>,
+}
+
+impl Trainer {
+    /// A run at its start: all policies uniform, all baselines 0.
+    pub fn new(grid: Grid, config: Config) -> Result<Trainer, ConfigError> {
+        config.check()?;
+        let (experts, cells, horizon) = (config.experts as usize, grid.cells(), config.horizon as usize);
+        let pairs = experts * cells;
+        let values = match config.baseline {
+            BaselineKind::Joint => pairs,
+            BaselineKind::Separate => pairs + cells,
+        };
+        let (mut to_go, mut weights) = (vec![0.0], Vec::new());
+        let mut weight = 1.0;
+        for step in 0..horizon {
+            // The reward is −1 a step, so that a return depends only on how many steps are left.
+            to_go.push(-1.0 + config.discount * to_go[step]);
+            weights.push(weight);
+            if config.return_to_go == ReturnToGo::FromStart {
+                weight *= config.discount;
+            }
+        }
+        Ok(Trainer {
+            rng: Xoshiro256PlusPlus::seed_from_u64(u64::from(config.seed)),
+            observer: config.observer.build(&grid, experts),
+            logits: vec![0.0; pairs * ACTIONS],
+            values: vec![0.0; values],
+            logits_adam: Adam::new(pairs * ACTIONS),
+            values_adam: Adam::new(values),
+            updates: 0,
+            to_go,
+            weights,
+            ensemble_tally: Tally::new(pairs * ACTIONS),
+            clone_tally: Tally::new(pairs * ACTIONS),
+            path: Vec::with_capacity(horizon),
+            entries: Vec::with_capacity(horizon),
+            grid,
+            config,
+        })
+    }
+
+    pub fn grid(&self) -> &Grid {
+        &self.grid
+    }
+
+    pub fn config(&self) -> &Config {
+        &self.config
+    }
+
+    /// Updates made so far.
+    pub fn updates(&self) -> u32 {
+        self.updates
+    }
+
+    /// β for the updates to come.
+    pub fn set_beta(&mut self, beta: f64) -> Result<(), ConfigError> {
+        let config = Config { beta, ..self.config.clone() };
+        config.check()?;
+        self.config = config;
+        Ok(())
+    }
+
+    /// The experts as they are now.
+    pub fn ensemble(&self) -> Ensemble {
+        let rows: Vec<[f64; ACTIONS]> = self.logits.as_chunks().0.iter().map(softmax).collect();
+        Ensemble::new(rows.chunks(self.grid.cells()).map(|rows| Policy::from_rows(rows.to_vec())).collect())
+    }
+
+    /// p(c|s) of the run's observer as it stands.
+    pub fn contexts(&mut self) -> Contexts {
+        let ensemble = self.ensemble();
+        self.observer.contexts(&self.grid, &ensemble, self.config.horizon)
+    }
+
+    /// A number that two runs share only when all their parameters agree to the last bit.
+    pub fn digest(&self) -> u64 {
+        let mut hash = fnv::FnvHasher::default();
+        for parameter in self.logits.iter().chain(&self.values) {
+            hash.write(&parameter.to_bits().to_le_bytes());
+        }
+        hash.finish()
+    }
+
+    /// One iteration of Algorithm 1.
+    pub fn update(&mut self) {
+        let ensemble = self.ensemble();
+        // 2: generate trajectories τ₁ with π_c.
+        self.play_ensemble(&ensemble);
+        // 3: generate trajectories τ₂ with π_o.
+        let contexts = self.observer.contexts(&self.grid, &ensemble, self.config.horizon);
+        self.play_clone(&ensemble, &contexts);
+        // 4: gradient update on the experts, θ ← θ + α_θ ∇J(θ).
+        let mut gradient = self.policy_gradient(&ensemble, &contexts);
+        self.add_entropy_bonus(&ensemble, &mut gradient);
+        let value_gradient = self.value_gradient();
+        self.logits_adam.ascend(&mut self.logits, &gradient, self.config.learning_rate);
+        // 5: update of the value function, φ ← φ − α_φ ∇J(φ).
+        self.values_adam.ascend(&mut self.values, &value_gradient, self.config.learning_rate);
+        self.updates += 1;
+    }
+
+    /// The gradient that the next update would take, without entropy bonus and without taking it. Every
+    /// call plays new episodes, so that calls give independent estimates.
+    pub fn estimate_gradient(&mut self) -> Gradient {
+        let ensemble = self.ensemble();
+        self.play_ensemble(&ensemble);
+        let contexts = self.observer.contexts(&self.grid, &ensemble, self.config.horizon);
+        self.play_clone(&ensemble, &contexts);
+        Gradient { logits: self.policy_gradient(&ensemble, &contexts), contexts }
+    }
+
+    /// Plays τ₁: an expert is drawn for an episode and acts for all of it.
+    fn play_ensemble(&mut self, ensemble: &Ensemble) {
+        let draws = action_draws(ensemble);
+        let (experts, cells) = (self.config.experts, self.grid.cells());
+        self.ensemble_tally.clear();
+        let starts = Starts::new(&self.grid);
+        while self.ensemble_tally.steps < self.config.batch_steps {
+            let context = self.rng.random_range(0..experts) as usize;
+            let mut state = starts.start(&mut self.rng);
+            self.path.clear();
+            self.entries.clear();
+            while state != self.grid.goal() && self.entries.len() < self.config.horizon as usize {
+                let pair = context * cells + state;
+                let action = draws[pair].outcome(self.rng.next_u32());
+                self.path.push(state as u32);
+                self.entries.push((pair * ACTIONS + action) as u32);
+                state = starts.step(state, action, &mut self.rng);
+            }
+            self.ensemble_tally.add_episode(&self.entries, &self.to_go, &self.weights);
+            self.observer.saw(context, &self.path);
+        }
+    }
+
+    /// Plays τ₂: the context is drawn anew at each state, then the action from that expert.
+    fn play_clone(&mut self, ensemble: &Ensemble, contexts: &Contexts) {
+        let draws = action_draws(ensemble);
+        let cells = self.grid.cells();
+        let context_draws: Vec<ContextDraw> = (0..cells).map(|state| Draw::new(contexts.row(state))).collect();
+        self.clone_tally.clear();
+        let starts = Starts::new(&self.grid);
+        while self.clone_tally.steps < self.config.batch_steps {
+            let mut state = starts.start(&mut self.rng);
+            self.entries.clear();
+            while state != self.grid.goal() && self.entries.len() < self.config.horizon as usize {
+                // One draw of 64 bits: half for the context, half for the action.
+                let bits = self.rng.next_u64();
+                let pair = context_draws[state].outcome((bits >> 32) as u32) * cells + state;
+                let action = draws[pair].outcome(bits as u32);
+                self.entries.push((pair * ACTIONS + action) as u32);
+                state = starts.step(state, action, &mut self.rng);
+            }
+            self.clone_tally.add_episode(&self.entries, &self.to_go, &self.weights);
+        }
+    }
+
+    /// G₁ + G₂ (paper, Eqs. 5–7).
+    fn policy_gradient(&self, ensemble: &Ensemble, contexts: &Contexts) -> Vec<f64> {
+        let (beta, cells) = (self.config.beta, self.grid.cells());
+        let pairs = self.config.experts as usize * cells;
+        let mut gradient = vec![0.0; pairs * ACTIONS];
+        let mut add = |pair: usize, score: [f64; ACTIONS]| {
+            // Σ_a score(a) ∇ log π_c(a|s), for a softmax: score(b) − π(b) Σ_a score(a).
+            let pi = ensemble.policies()[pair / cells].row(pair % cells);
+            let sum: f64 = score.iter().sum();
+            for b in 0..ACTIONS {
+                gradient[pair * ACTIONS + b] += score[b] - pi[b] * sum;
+            }
+        };
+        // Σ over a tally's entries of one (context, state): the returns, times `scale`, less a baseline.
+        let advantages = |tally: &Tally, pair: usize, scale: f64, baseline: f64| -> [f64; ACTIONS] {
+            std::array::from_fn(|action| {
+                let entry = pair * ACTIONS + action;
+                scale * tally.returns[entry] - baseline * f64::from(tally.count[entry])
+            })
+        };
+        // G₁ = 1/N₁ Σ ∇ log π_c(a|s) Ã(t), Ã(t) = R(t) − Ṽ_c(s).
+        let per_episode = 1.0 / f64::from(self.ensemble_tally.episodes);
+        for pair in 0..pairs {
+            add(pair, advantages(&self.ensemble_tally, pair, 1.0, self.values[pair]).map(|a| a * per_episode));
+        }
+        // G₂ = 1/N₂ Σ ∇ log π_o(a|s) Ã(t), Ã(t) = −βR(t) − Ṽ_o(s).
+        let per_episode = 1.0 / f64::from(self.clone_tally.episodes);
+        match self.config.gradient {
+            GradientKind::SampledContext => {
+                for pair in 0..pairs {
+                    let baseline = match self.config.baseline {
+                        BaselineKind::Joint => self.values[pair],
+                        BaselineKind::Separate => -beta * self.values[pairs + pair % cells],
+                    };
+                    add(pair, advantages(&self.clone_tally, pair, -beta, baseline).map(|a| a * per_episode));
+                }
+            }
+            GradientKind::Mixture => {
+                for state in 0..cells {
+                    let p = contexts.row(state);
+                    // The score does not depend on the context drawn, so neither may the baseline.
+                    let baseline = match self.config.baseline {
+                        BaselineKind::Joint => {
+                            p.iter().enumerate().map(|(c, p)| p * self.values[c * cells + state]).sum()
+                        }
+                        BaselineKind::Separate => -beta * self.values[pairs + state],
+                    };
+                    let mut advantage = [0.0; ACTIONS];
+                    let mut mixed = [0.0; ACTIONS];
+                    for (c, p) in p.iter().enumerate() {
+                        let drawn = advantages(&self.clone_tally, c * cells + state, -beta, baseline);
+                        let pi = ensemble.policies()[c].row(state);
+                        for action in 0..ACTIONS {
+                            advantage[action] += drawn[action];
+                            mixed[action] += p * pi[action];
+                        }
+                    }
+                    for (c, p) in p.iter().enumerate() {
+                        let pi = ensemble.policies()[c].row(state);
+                        // Responsibility of expert c for the action: p(c|s) π_c(a|s) / π_o(a|s).
+                        add(
+                            c * cells + state,
+                            std::array::from_fn(|action| {
+                                let share = if mixed[action] > 0.0 { p * pi[action] / mixed[action] } else { 0.0 };
+                                share * advantage[action] * per_episode
+                            }),
+                        );
+                    }
+                }
+            }
+        }
+        gradient
+    }
+
+    /// Weight of the entropy bonus for the coming update: linear from start to end, then as at the end.
+    fn entropy_weight(&self) -> f64 {
+        let Config { entropy_start, entropy_end, .. } = self.config;
+        let last = (self.config.updates() - 1).max(1);
+        entropy_start + (entropy_end - entropy_start) * f64::from(self.updates.min(last)) / f64::from(last)
+    }
+
+    /// Adds the gradient of the mean entropy of the policies where τ₁ and τ₂ went.
+    fn add_entropy_bonus(&self, ensemble: &Ensemble, gradient: &mut [f64]) {
+        let weight = self.entropy_weight();
+        if weight == 0.0 {
+            return;
+        }
+        let cells = self.grid.cells();
+        for (pair, gradient) in gradient.as_chunks_mut::<ACTIONS>().0.iter_mut().enumerate() {
+            let share = |tally: &Tally| tally.pair(pair).0 / f64::from(tally.steps);
+            let visited = share(&self.ensemble_tally) + share(&self.clone_tally);
+            if visited == 0.0 {
+                continue;
+            }
+            let pi = ensemble.policies()[pair / cells].row(pair % cells);
+            let log = pi.map(|p| if p > 0.0 { libm::log(p) } else { 0.0 });
+            let entropy: f64 = -pi.iter().zip(&log).map(|(p, log)| p * log).sum::<f64>();
+            for b in 0..ACTIONS {
+                gradient[b] -= weight * visited * pi[b] * (log[b] + entropy);
+            }
+        }
+    }
+
+    /// −∇J(φ) (paper, Eq. 4): the way down the squared error of the baselines, per episode.
+    fn value_gradient(&self) -> Vec<f64> {
+        let Config { beta, value_weight, baseline, .. } = self.config;
+        let pairs = self.config.experts as usize * self.grid.cells();
+        let mut gradient = vec![0.0; self.values.len()];
+        for pair in 0..pairs {
+            let mut fit = |tally: &Tally, index: usize, scale: f64| {
+                let (count, returns) = tally.pair(pair);
+                let error = scale * returns - count * self.values[index];
+                gradient[index] += value_weight * error / f64::from(tally.episodes);
+            };
+            fit(&self.ensemble_tally, pair, 1.0);
+            match baseline {
+                BaselineKind::Joint => fit(&self.clone_tally, pair, -beta),
+                // Fitted to R itself, so that β can change while it trains.
+                BaselineKind::Separate => fit(&self.clone_tally, pairs + pair % self.grid.cells(), 1.0),
+            }
+        }
+        gradient
+    }
+}
+
+/// For each (context, state), the draw of its action.
+fn action_draws(ensemble: &Ensemble) -> Vec<Draw<ACTIONS>> {
+    ensemble.policies().iter().flat_map(|policy| policy.rows().iter().map(|row| Draw::new(row))).collect()
+}
+
+/// π(a) = exp θ_a / Σ exp θ, the same bits on every machine.
+fn softmax(logits: &[f64; ACTIONS]) -> [f64; ACTIONS] {
+    let top = logits.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let weights = logits.map(|logit| libm::exp(logit - top));
+    let sum: f64 = weights.iter().sum();
+    weights.map(|weight| weight / sum)
+}

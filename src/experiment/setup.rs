@@ -1,0 +1,71 @@
+//! What a run starts from: a grid and a configuration.
+
+use serde::{Deserialize, Serialize};
+
+use crate::ape::{Config, ConfigError, EnsembleFile};
+use crate::mdp::{Grid, GridError, GridSpec};
+
+/// A grid, a configuration, and an ensemble where one is given instead of trained.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Setup {
+    pub grid: GridSpec,
+    pub config: Config,
+    /// An ensemble to look at; nothing is trained then.
+    pub ensemble: Option<EnsembleFile>,
+}
+
+/// Why a setup is refused.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum SetupError {
+    #[error("not a configuration: {0}")]
+    Json(String),
+    #[error("grid: {0}")]
+    Grid(#[from] GridError),
+    #[error("config: {0}")]
+    Config(#[from] ConfigError),
+}
+
+impl Setup {
+    /// Reads a configuration file: the fields of [`Config`], with a `grid` where it is not the paper's. An
+    /// ensemble file does too: its `grid` and `config` are taken.
+    pub fn parse(text: &str) -> Result<Setup, SetupError> {
+        let json = |error: serde_json::Error| SetupError::Json(error.to_string());
+        let value: serde_json::Value = serde_json::from_str(text).map_err(json)?;
+        let serde_json::Value::Object(mut fields) = value else {
+            return Err(SetupError::Json("expected an object of fields, as {\"beta\": 0.3, \"seed\": 2}".to_owned()));
+        };
+        let grid: GridSpec =
+            fields.remove("grid").map_or(Ok(GridSpec::default()), serde_json::from_value).map_err(json)?;
+        let config = fields.remove("config").unwrap_or(serde_json::Value::Object(fields));
+        let config: Config = serde_json::from_value(config).map_err(json)?;
+        Grid::new(grid.clone())?;
+        config.check()?;
+        Ok(Setup { grid, config, ensemble: None })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn fields_alone_or_an_ensemble_file_will_do() {
+        let setup = Setup::parse(r#"{"beta": 0.25, "observer": "replay(7)"}"#).unwrap();
+        assert_eq!((setup.config.beta, setup.config.observer.to_string().as_str()), (0.25, "replay(7)"));
+        let file = r#"{"format": "ape-ensemble", "version": 1, "experts": [], "config": {"seed": 5},
+            "grid": {"rows": 3, "cols": 4, "goal": [1, 1], "walls": [[0, 0]], "slip": 0.1}}"#;
+        let setup = Setup::parse(file).unwrap();
+        assert_eq!((setup.grid.cols, setup.config.seed), (4, 5));
+    }
+
+    #[test]
+    fn what_is_wrong_is_said() {
+        let sentence = |text| Setup::parse(text).unwrap_err().to_string();
+        assert_eq!(sentence(r#"{"beta": 5}"#), "config: beta 5: must be a number from 0 to 2");
+        assert!(sentence(r#"{"betta": 0.5}"#).contains("unknown field `betta`"));
+        assert!(sentence(r#"{"observer": "me"}"#).contains("must be one of uniform"));
+        assert!(sentence(r#"{"grid": {"rows": 1, "cols": 4, "goal": [0, 0]}}"#).contains("1 × 4"));
+        assert!(sentence("[]").contains("expected an object"));
+        assert!(sentence("{").contains("EOF"));
+    }
+}

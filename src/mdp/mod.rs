@@ -1,0 +1,18 @@
+//! The Markov decision process of the paper: a gridworld, stationary policies, and what they return.
+//!
+//! Everything here is exact or a single draw; nothing learns and nothing knows of ensembles.
+
+mod grid;
+mod optimal;
+mod policy;
+mod returns;
+mod rollout;
+
+pub use grid::{Action, Cell, Grid, GridError, GridSpec};
+pub use optimal::optimal_policy;
+pub use policy::{Policy, PolicyError};
+pub use returns::{CAP, HORIZON, Occupancy, Returns, Solver, Value, occupancy};
+pub use rollout::{Draw, Starts};
+
+/// Number of actions.
+pub const ACTIONS: usize = 5;
