@@ -1,0 +1,134 @@
+#![cfg(not(target_arch = "wasm32"))]
+//! The command `ape` as a user meets it: what it writes, and what it says of bad input.
+
+use std::path::PathBuf;
+use std::process::{Command, Output};
+
+use ape_lab::ape::{Ensemble, EnsembleFile};
+use ape_lab::experiment::PRESETS;
+use ape_lab::mdp::{Grid, GridSpec, Policy};
+use serde_json::{Value, json};
+
+fn ape(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_ape")).args(arguments).output().unwrap()
+}
+
+fn file(name: &str) -> PathBuf {
+    PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(name)
+}
+
+/// The one line that `ape` says of bad input; anything else about it fails the test.
+fn complaint(arguments: &[&str]) -> String {
+    let output = ape(arguments);
+    let line = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(2), "{line}");
+    assert_eq!(line.lines().count(), 1, "{line}");
+    assert!(output.stdout.is_empty());
+    line
+}
+
+#[test]
+fn a_trained_ensemble_evaluates_to_the_figures_it_was_printed_with() {
+    let (out, curve) = (file("trained.json"), file("curve.csv"));
+    let arguments = ["train", "--total-steps", "80000", "--seed", "7", "--experts", "3"];
+    let files = ["--out", out.to_str().unwrap(), "--curve", curve.to_str().unwrap()];
+    let output = ape(&[&arguments[..], &files[..]].concat());
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let trained: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let evaluated: Value = serde_json::from_slice(&ape(&["evaluate", files[1]]).stdout).unwrap();
+    assert_eq!(trained["updates"], 19);
+    for key in ["experts", "ensemble", "clone_uniform", "clone_occupancy", "identity", "optimal"] {
+        let (a, b) = (&trained[key], &evaluated[key]);
+        // The file's probabilities are normalised once more when read: the last bits may differ.
+        let close =
+            |a: &Value, b: &Value| (a.as_f64().unwrap() - b.as_f64().unwrap()).abs() < 1e-9 * a.as_f64().unwrap().abs();
+        match a {
+            Value::Object(fields) => fields.iter().for_each(|(k, v)| assert!(close(v, &b[k]), "{key} {k}")),
+            _ => assert_eq!(a.as_array().unwrap().len(), 3),
+        }
+    }
+    // The curve's last row is the result; and the ensemble file is a configuration file too.
+    let curve = std::fs::read_to_string(&curve).unwrap();
+    let last: Vec<&str> = curve.lines().last().unwrap().split(',').collect();
+    assert_eq!(curve.lines().count(), 20);
+    assert_eq!((last[0], last[1].parse().ok()), ("19", trained["ensemble"]["capped_return"].as_f64()));
+    let again: Value = serde_json::from_slice(&ape(&["train", "--config", files[1]]).stdout).unwrap();
+    assert_eq!(again["digest"], trained["digest"]);
+}
+
+#[test]
+fn flags_reach_the_configuration() {
+    let config = file("config.json");
+    std::fs::write(&config, json!({"batch_steps": 100, "total_steps": 300, "seed": 3}).to_string()).unwrap();
+    let digest = |extra: &[&str]| {
+        let output = ape(&[&["train", "--config", config.to_str().unwrap()], extra].concat());
+        serde_json::from_slice::<Value>(&output.stdout).unwrap()["digest"].clone()
+    };
+    let plain = digest(&[]);
+    assert_eq!(plain, digest(&["--seed", "3"]));
+    for different in [
+        ["--seed", "4"],
+        ["--beta", "0.5"],
+        ["--gradient", "mixture"],
+        ["--baseline", "joint"],
+        ["--observer", "occupancy"],
+        ["--learning-rate", "0.06"],
+        ["--discount", "0.9"],
+        ["--return-to-go", "from_start"],
+        ["--horizon", "90"],
+    ] {
+        assert_ne!(plain, digest(&different), "{different:?}");
+    }
+}
+
+#[test]
+fn presets_are_listed() {
+    let list = String::from_utf8(ape(&["presets"]).stdout).unwrap();
+    let names: Vec<&str> = list.lines().map(|line| line.split_whitespace().next().unwrap()).collect();
+    assert_eq!(names, PRESETS.iter().map(|preset| preset.name).collect::<Vec<_>>());
+}
+
+#[test]
+fn bad_flags_get_one_sentence() {
+    assert!(complaint(&["train", "--beta", "5"]).contains("--beta 5: must be a number from 0 to 2"));
+    assert!(complaint(&["train", "--observer", "me"]).contains("one of uniform, occupancy, replay(60)"));
+    assert!(complaint(&["train", "--preset", "none"]).contains("blind, paper, no-protection, trap"));
+    assert!(complaint(&["train", "--preset", "trap"]).contains("nothing to train"));
+    assert!(complaint(&["train", "--learning-rate"]).contains("--learning-rate"));
+    assert!(complaint(&["train", "--no-such-flag"]).contains("--no-such-flag"));
+    assert!(complaint(&["train", "--seed", "-1"]).contains("--seed -1"));
+    assert!(complaint(&[]).contains("evaluate, train, presets"));
+    assert!(complaint(&["evaluate", "/no/such/file"]).contains("/no/such/file"));
+}
+
+#[test]
+fn bad_files_get_one_sentence_and_leave_nothing_behind() {
+    let grid = Grid::new(GridSpec { rows: 2, cols: 2, ..GridSpec::default() }).unwrap();
+    let good = EnsembleFile::new(&grid, &Ensemble::new(vec![Policy::from_rows(vec![[0.2; 5]; 4])]), None);
+    let good = serde_json::to_value(good).unwrap();
+    for (change, expected) in [
+        (json!({"format": "other"}), "must be \"ape-ensemble\""),
+        (json!({"version": 2}), "reads version 1"),
+        (json!({"experts": []}), "from 1 to 8"),
+        (json!({"experts": [[[0.2, 0.2, 0.2, 0.2, 0.2]]]}), "expert 1: the policy has 1 rows"),
+        (json!({"experts": [vec![[0.5; 5]; 4]]}), "sum to 2.5"),
+        (json!({"experts": [[[0.2]]]}), "not an ensemble file"),
+        (json!({"grid": {"rows": 2, "cols": 2, "goal": [5, 0]}}), "lies outside"),
+        (json!({"grid": {"rows": 99, "cols": 2, "goal": [0, 0]}}), "from 2 to 32"),
+    ] {
+        let mut bad = good.clone();
+        bad.as_object_mut().unwrap().extend(change.as_object().unwrap().clone());
+        let path = file("bad.json");
+        std::fs::write(&path, bad.to_string()).unwrap();
+        let line = complaint(&["evaluate", path.to_str().unwrap()]);
+        assert!(line.contains("bad.json") && line.contains(expected), "{line}");
+    }
+    let nowhere = file("no-such-folder").join("out.json");
+    let line = complaint(&["train", "--total-steps", "1", "--out", nowhere.to_str().unwrap()]);
+    assert!(line.contains("no-such-folder"), "{line}");
+    // A folder cannot be replaced by a file: the part written before is taken away again.
+    let folder = file("folder.json");
+    std::fs::create_dir_all(folder.join("kept")).unwrap();
+    complaint(&["train", "--total-steps", "1", "--out", folder.to_str().unwrap()]);
+    assert!(!file("folder.json.part").exists());
+}
