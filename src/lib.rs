@@ -16,7 +16,7 @@ pub mod ape;
 pub mod experiment;
 pub mod lab;
 pub mod mdp;
-//#[cfg(feature = "page")]
-//pub mod ui;
-//#[cfg(target_arch = "wasm32")]
-//pub mod web;
+#[cfg(feature = "page")]
+pub mod ui;
+#[cfg(target_arch = "wasm32")]
+pub mod web;

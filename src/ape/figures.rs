@@ -39,7 +39,7 @@ impl Figures {
         let experts: Vec<Returns> =
             ensemble.policies().iter().map(|policy| solver.evaluate(policy, horizon).returns).collect();
         let uniform = ensemble.cloned(&Contexts::equal(grid.cells(), ensemble.experts()));
-        let honest = ObserverChoice::OCCUPANCY.build(grid, ensemble.experts()).contexts(grid, ensemble, horizon);
+        let honest = ObserverChoice::OCCUPANCY.contexts(grid, ensemble, horizon, 0);
         let clone = solver.evaluate(&ensemble.cloned(&honest), horizon);
         let n = ensemble.experts() as f64;
         let played: Vec<_> = ensemble.policies().iter().map(|policy| occupancy(grid, policy, horizon)).collect();

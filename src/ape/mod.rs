@@ -4,6 +4,7 @@
 
 mod adam;
 mod config;
+mod demonstrate;
 mod ensemble;
 mod fields;
 mod figures;

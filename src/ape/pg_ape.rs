@@ -10,16 +10,14 @@
 
 use std::hash::Hasher;
 
-use rand::{Rng, RngExt, SeedableRng};
+use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::adam::Adam;
+use super::demonstrate::{ContextDraw, Demonstrator, Episode, action_draws};
 use super::observer::Observer;
 use super::{BaselineKind, Config, ConfigError, Contexts, Ensemble, GradientKind, ReturnToGo};
-use crate::mdp::{ACTIONS, Draw, Grid, Policy, Starts};
-
-/// Outcomes of a draw among contexts.
-type ContextDraw = Draw<{ Config::MAX_EXPERTS as usize }>;
+use crate::mdp::{ACTIONS, Grid, Policy, Starts};
 
 /// A batch of episodes as far as learning needs it, per (context, state, action).
 struct Tally {
@@ -88,9 +86,7 @@ pub struct Trainer {
     weights: Vec<f64>,
     ensemble_tally: Tally,
     clone_tally: Tally,
-    /// One episode: its cells and its entries in the tally.
-    path: Vec<u32>,
-    entries: Vec<u32>,
+    episode: Episode,
 }
 
 impl Trainer {
@@ -125,8 +121,7 @@ impl Trainer {
             weights,
             ensemble_tally: Tally::new(pairs * ACTIONS),
             clone_tally: Tally::new(pairs * ACTIONS),
-            path: Vec::with_capacity(horizon),
-            entries: Vec::with_capacity(horizon),
+            episode: Episode::default(),
             grid,
             config,
         })
@@ -204,24 +199,12 @@ impl Trainer {
 
     /// Plays τ₁: an expert is drawn for an episode and acts for all of it.
     fn play_ensemble(&mut self, ensemble: &Ensemble) {
-        let draws = action_draws(ensemble);
-        let (experts, cells) = (self.config.experts, self.grid.cells());
         self.ensemble_tally.clear();
-        let starts = Starts::new(&self.grid);
+        let demonstrator = Demonstrator::new(&self.grid, ensemble, self.config.horizon);
         while self.ensemble_tally.steps < self.config.batch_steps {
-            let context = self.rng.random_range(0..experts) as usize;
-            let mut state = starts.start(&mut self.rng);
-            self.path.clear();
-            self.entries.clear();
-            while state != self.grid.goal() && self.entries.len() < self.config.horizon as usize {
-                let pair = context * cells + state;
-                let action = draws[pair].outcome(self.rng.next_u32());
-                self.path.push(state as u32);
-                self.entries.push((pair * ACTIONS + action) as u32);
-                state = starts.step(state, action, &mut self.rng);
-            }
-            self.ensemble_tally.add_episode(&self.entries, &self.to_go, &self.weights);
-            self.observer.saw(context, &self.path);
+            let context = demonstrator.play(&mut self.episode, &mut self.rng);
+            self.ensemble_tally.add_episode(&self.episode.entries, &self.to_go, &self.weights);
+            self.observer.saw(context, &self.episode.states);
         }
     }
 
@@ -229,21 +212,21 @@ impl Trainer {
     fn play_clone(&mut self, ensemble: &Ensemble, contexts: &Contexts) {
         let draws = action_draws(ensemble);
         let cells = self.grid.cells();
-        let context_draws: Vec<ContextDraw> = (0..cells).map(|state| Draw::new(contexts.row(state))).collect();
+        let context_draws: Vec<ContextDraw> = (0..cells).map(|state| ContextDraw::new(contexts.row(state))).collect();
         self.clone_tally.clear();
         let starts = Starts::new(&self.grid);
         while self.clone_tally.steps < self.config.batch_steps {
             let mut state = starts.start(&mut self.rng);
-            self.entries.clear();
-            while state != self.grid.goal() && self.entries.len() < self.config.horizon as usize {
+            self.episode.entries.clear();
+            while state != self.grid.goal() && self.episode.entries.len() < self.config.horizon as usize {
                 // One draw of 64 bits: half for the context, half for the action.
                 let bits = self.rng.next_u64();
                 let pair = context_draws[state].outcome((bits >> 32) as u32) * cells + state;
                 let action = draws[pair].outcome(bits as u32);
-                self.entries.push((pair * ACTIONS + action) as u32);
+                self.episode.entries.push((pair * ACTIONS + action) as u32);
                 state = starts.step(state, action, &mut self.rng);
             }
-            self.clone_tally.add_episode(&self.entries, &self.to_go, &self.weights);
+            self.clone_tally.add_episode(&self.episode.entries, &self.to_go, &self.weights);
         }
     }
 
@@ -370,11 +353,6 @@ impl Trainer {
         }
         gradient
     }
-}
-
-/// For each (context, state), the draw of its action.
-fn action_draws(ensemble: &Ensemble) -> Vec<Draw<ACTIONS>> {
-    ensemble.policies().iter().flat_map(|policy| policy.rows().iter().map(|row| Draw::new(row))).collect()
 }
 
 /// π(a) = exp θ_a / Σ exp θ, the same bits on every machine.

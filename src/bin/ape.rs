@@ -7,7 +7,7 @@ use std::process::ExitCode;
 
 use ape_lab::ape::{EnsembleFile, FIELDS, Field, Figures, Trainer};
 use ape_lab::experiment::{PRESETS, Preset, Setup};
-use ape_lab::mdp::{Grid, HORIZON, Returns, Solver};
+use ape_lab::mdp::{Grid, HORIZON, RETURN_KINDS, Returns, Solver};
 use clap::{Arg, ArgMatches, Command};
 use serde::Serialize;
 
@@ -155,8 +155,8 @@ fn train(matches: &ArgMatches) -> Result<(), String> {
     let curve_file = matches.get_one::<String>("curve");
     let mut curve = "update".to_owned();
     for of in ["ensemble", "clone"] {
-        for figure in ["capped_return", "uncapped_return", "horizon_return", "success"] {
-            curve += &format!(",{of}_{figure}");
+        for kind in &RETURN_KINDS {
+            curve += &format!(",{of}_{}", kind.name);
         }
     }
     curve += "\n";
@@ -168,8 +168,10 @@ fn train(matches: &ArgMatches) -> Result<(), String> {
                 ensemble.policies().iter().map(|policy| solver.evaluate(policy, horizon).returns).collect();
             let clone = solver.evaluate(&ensemble.cloned(&trainer.contexts()), horizon).returns;
             curve += &update.to_string();
-            for r in [Returns::mean(&experts), clone] {
-                curve += &format!(",{},{},{},{}", r.capped_return, r.uncapped_return, r.horizon_return, r.success);
+            for returns in [Returns::mean(&experts), clone] {
+                for kind in &RETURN_KINDS {
+                    curve += &format!(",{}", (kind.get)(&returns));
+                }
             }
             curve += "\n";
         }

@@ -1,6 +1,7 @@
 //! The presets: a name, a sentence, and what to start from. A preset is one line in [`PRESETS`].
 
 use super::Setup;
+use crate::ape::observer::ObserverChoice;
 use crate::ape::{Config, Ensemble, EnsembleFile};
 use crate::mdp::{Action, Grid, GridSpec, Policy};
 
@@ -71,5 +72,6 @@ fn trap() -> Setup {
         _ => Action::Left,
     });
     let ensemble = EnsembleFile::new(&grid, &Ensemble::new(vec![first, second]), None);
-    Setup { ensemble: Some(ensemble), ..Setup::default() }
+    let config = Config { observer: ObserverChoice::OCCUPANCY, ..Config::default() };
+    Setup { ensemble: Some(ensemble), config, ..Setup::default() }
 }

@@ -1,1 +1,18 @@
+//! A training session that a page plays with: messages in, messages out.
+//!
+//! [`Session`] is the state machine; it knows neither browsers nor threads and asks its driver for the time.
+//! In the browser a Web Worker drives it (`src/bin/worker.rs`), in a window a thread ([`ThreadLink`]). The
+//! page holds the other end as a [`Link`].
 
+mod link;
+mod protocol;
+mod session;
+#[cfg(not(target_arch = "wasm32"))]
+mod thread;
+
+pub use link::Link;
+pub use protocol::{CloneView, Command, CurvePoint, Event, PROTOCOL, PolicyView, RunState, Snapshot, Started};
+pub use protocol::{decode, encode};
+pub use session::{Pace, Session};
+#[cfg(not(target_arch = "wasm32"))]
+pub use thread::ThreadLink;

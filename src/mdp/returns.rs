@@ -33,6 +33,51 @@ pub struct Returns {
     pub success: f64,
 }
 
+/// One of the four returns: what menus, tables and files call it.
+pub struct ReturnKind {
+    /// As in files.
+    pub name: &'static str,
+    /// As on the page, in a word or two.
+    pub label: &'static str,
+    pub help: &'static str,
+    /// In steps, or a probability.
+    pub is_steps: bool,
+    pub get: fn(&Returns) -> f64,
+}
+
+/// The four returns; the paper's figure first.
+pub static RETURN_KINDS: [ReturnKind; 4] = [
+    ReturnKind {
+        name: "capped_return",
+        label: "capped",
+        help: "−mean min(h(s), 100): hitting times cut at 100 steps a cell, the paper's figure. A clone that gets \
+               lost once in a hundred runs has a huge mean hitting time, so this can look far worse than it is.",
+        is_steps: true,
+        get: |returns| returns.capped_return,
+    },
+    ReturnKind {
+        name: "uncapped_return",
+        label: "uncapped",
+        help: "−mean h(s): hitting times as they are.",
+        is_steps: true,
+        get: |returns| returns.uncapped_return,
+    },
+    ReturnKind {
+        name: "horizon_return",
+        label: "within T",
+        help: "−mean E[min(τ, T)]: what an episode of at most T steps really costs.",
+        is_steps: true,
+        get: |returns| returns.horizon_return,
+    },
+    ReturnKind {
+        name: "success",
+        label: "success",
+        help: "Probability of reaching the goal within T steps, mean over starts.",
+        is_steps: false,
+        get: |returns| returns.success,
+    },
+];
+
 impl Returns {
     /// The mean of several policies' returns, as for an ensemble.
     pub fn mean(of: &[Returns]) -> Returns {

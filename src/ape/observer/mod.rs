@@ -7,8 +7,11 @@ mod occupancy;
 mod replay;
 mod uniform;
 
+use rand::SeedableRng;
+use rand_xoshiro::Xoshiro256PlusPlus;
 use serde::{Deserialize, Serialize};
 
+use super::demonstrate::{Demonstrator, Episode};
 use super::{Contexts, Ensemble};
 use crate::mdp::Grid;
 
@@ -76,6 +79,28 @@ impl ObserverChoice {
 
     pub fn build(&self, grid: &Grid, experts: usize) -> Box<dyn Observer> {
         (self.model().build)(grid, experts, self.parameter)
+    }
+
+    /// p(c|s) of this observer for an ensemble that changes no more. A model that learns watches fresh
+    /// episodes first, `parameter` from every start in the mean, though no more than half a million steps.
+    pub fn contexts(&self, grid: &Grid, ensemble: &Ensemble, horizon: u32, seed: u32) -> Contexts {
+        const MOST_STEPS: usize = 500_000;
+        let mut observer = self.build(grid, ensemble.experts());
+        if self.model().learns {
+            let demonstrator = Demonstrator::new(grid, ensemble, horizon);
+            let mut rng = Xoshiro256PlusPlus::seed_from_u64(u64::from(seed));
+            let mut episode = Episode::default();
+            let mut steps = 0;
+            for _ in 0..self.parameter as usize * grid.starts().len() {
+                let context = demonstrator.play(&mut episode, &mut rng);
+                observer.saw(context, &episode.states);
+                steps += episode.states.len();
+                if steps >= MOST_STEPS {
+                    break;
+                }
+            }
+        }
+        observer.contexts(grid, ensemble, horizon)
     }
 }
 

@@ -1,0 +1,396 @@
+//! The state machine behind the page: it trains, and tells what there is to see.
+//!
+//! It is driven from outside: [`Session::handle`] takes a command, [`Session::advance`] works for a few
+//! milliseconds and says when to call it again, [`Session::events`] hands out what is to be sent.
+
+use super::{CloneView, Command, CurvePoint, Event, PolicyView, RunState, Snapshot, Started};
+use crate::ape::observer::ObserverChoice;
+use crate::ape::{Config, Contexts, Ensemble, EnsembleFile, Trainer};
+use crate::experiment::Setup;
+use crate::mdp::{Grid, Policy, Returns, Solver, Value, optimal_policy};
+
+/// Longest stretch of work between two looks at the inbox, in milliseconds.
+const STRETCH: f64 = 8.0;
+/// Least time between two snapshots, in milliseconds: 60 a second.
+const FRAME: f64 = 1000.0 / 60.0;
+/// Snapshots that may be on their way to the page.
+const IN_FLIGHT: usize = 2;
+/// How long the page may owe an answer before training waits for it, in milliseconds.
+const PATIENCE: f64 = 250.0;
+/// Points that a whole run leaves on the curve.
+const CURVE_POINTS: u32 = 120;
+
+/// When a driver should call [`Session::advance`] again.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Pace {
+    /// As soon as it has looked for commands.
+    Now,
+    /// In so many milliseconds, or when a command comes.
+    After(f64),
+    /// When a command comes.
+    Idle,
+}
+
+/// What is being shown: a training run or a given ensemble.
+enum Subject {
+    Training(Box<Trainer>),
+    Given { grid: Grid, ensemble: Ensemble },
+}
+
+impl Subject {
+    fn grid(&self) -> &Grid {
+        match self {
+            Subject::Training(trainer) => trainer.grid(),
+            Subject::Given { grid, .. } => grid,
+        }
+    }
+}
+
+struct Run {
+    setup: Setup,
+    subject: Subject,
+    is_playing: bool,
+    /// Nothing is shown before the end.
+    is_silent: bool,
+    last_update: u32,
+    training_ms: f64,
+    curve: Vec<CurvePoint>,
+}
+
+/// A training session.
+#[derive(Default)]
+pub struct Session {
+    run: Option<Run>,
+    runs: u32,
+    speed: Option<f32>,
+    show: Vec<ObserverChoice>,
+    /// A β to retrain with when the retraining under way has ended.
+    next_beta: Option<f64>,
+    outbox: Vec<Event>,
+    /// Something has changed since the last snapshot.
+    is_changed: bool,
+    snapshots: u32,
+    /// Number and time of the snapshots that the page has not drawn yet.
+    in_flight: Vec<(u32, f64)>,
+    /// When the next snapshot may be made.
+    next_snapshot: f64,
+    /// When updates were last counted against the speed.
+    paced: f64,
+    /// Updates that the speed allows by now.
+    allowance: f64,
+}
+
+impl Session {
+    pub fn new() -> Session {
+        Session::default()
+    }
+
+    /// What is to be sent, in order.
+    pub fn events(&mut self) -> Vec<Event> {
+        std::mem::take(&mut self.outbox)
+    }
+
+    /// Takes a command. What is not possible is refused with a sentence and changes nothing.
+    pub fn handle(&mut self, command: Command) {
+        if let Err(sentence) = self.carry_out(command) {
+            self.outbox.push(Event::Refused(sentence));
+        }
+    }
+
+    fn carry_out(&mut self, command: Command) -> Result<(), String> {
+        match command {
+            Command::Load { setup, play } => {
+                self.next_beta = None;
+                self.begin(*setup, play, false)?;
+            }
+            Command::Retrain { beta } => {
+                let run = self.training()?;
+                if run.is_silent && run.is_playing {
+                    self.next_beta = Some(beta);
+                } else {
+                    self.retrain(beta)?;
+                }
+            }
+            Command::Continue { beta } => {
+                let run = self.training()?;
+                run.trainer_mut().set_beta(beta).map_err(|error| error.to_string())?;
+                run.setup.config.beta = beta;
+                run.go_on();
+            }
+            Command::Play => self.training()?.go_on(),
+            Command::Pause => {
+                let run = self.training()?;
+                (run.is_playing, run.is_silent) = (false, false);
+                self.next_beta = None;
+            }
+            Command::Step => {
+                let run = self.training()?;
+                (run.is_playing, run.is_silent) = (false, false);
+                run.last_update = run.last_update.max(run.trainer().updates() + 1);
+                run.update();
+            }
+            Command::Reset => {
+                let setup = self.run.as_ref().ok_or(NOTHING)?.setup.clone();
+                self.next_beta = None;
+                self.begin(setup, false, false)?;
+            }
+            Command::Speed(speed) => {
+                self.speed = speed;
+                self.allowance = 0.0;
+                return Ok(());
+            }
+            Command::Show(observers) => self.show = observers,
+            Command::Seen(number) => {
+                self.in_flight.retain(|&(sent, _)| sent > number);
+                return Ok(());
+            }
+        }
+        self.is_changed = true;
+        Ok(())
+    }
+
+    /// The run, where it is one that trains.
+    fn training(&mut self) -> Result<&mut Run, String> {
+        match &mut self.run {
+            Some(run) if matches!(run.subject, Subject::Training(_)) => Ok(run),
+            Some(_) => Err("This ensemble was given: there is nothing to train.".to_owned()),
+            None => Err(NOTHING.to_owned()),
+        }
+    }
+
+    fn retrain(&mut self, beta: f64) -> Result<(), String> {
+        let mut setup = self.training()?.setup.clone();
+        setup.config.beta = beta;
+        self.begin(setup, true, true)
+    }
+
+    /// Puts a new run in the place of the old one, if its setup is good.
+    fn begin(&mut self, setup: Setup, is_playing: bool, is_silent: bool) -> Result<(), String> {
+        let subject = match setup.ensemble.clone().map(EnsembleFile::check) {
+            Some(given) => {
+                let (grid, ensemble) = given.map_err(|error| error.to_string())?;
+                Subject::Given { grid, ensemble }
+            }
+            None => {
+                let grid = Grid::new(setup.grid.clone()).map_err(|error| error.to_string())?;
+                let trainer = Trainer::new(grid, setup.config.clone()).map_err(|error| error.to_string())?;
+                Subject::Training(Box::new(trainer))
+            }
+        };
+        self.runs += 1;
+        let grid = subject.grid();
+        let optimal = optimal_policy(grid);
+        let value = Solver::new(grid).evaluate(&optimal, setup.config.horizon);
+        self.outbox.push(Event::Started(Box::new(Started {
+            run: self.runs,
+            setup: setup.clone(),
+            optimal: policy_view(&optimal, value),
+        })));
+        let is_training = matches!(subject, Subject::Training(_));
+        let mut run = Run {
+            last_update: if is_training { setup.config.updates() } else { 0 },
+            is_playing: is_playing && is_training,
+            is_silent,
+            setup,
+            subject,
+            training_ms: 0.0,
+            curve: Vec::new(),
+        };
+        run.add_curve_point();
+        self.run = Some(run);
+        self.is_changed = true;
+        Ok(())
+    }
+
+    /// Trains for a few milliseconds where there is something to train, and makes a snapshot where there is
+    /// something new to see. `clock` counts milliseconds from any moment.
+    pub fn advance(&mut self, clock: &dyn Fn() -> f64) -> Pace {
+        let now = clock();
+        let mut pace = self.train(now, clock);
+        if let Some(run) = &self.run {
+            let has_ended = run.is_silent && !run.is_playing;
+            if has_ended && let Some(beta) = self.next_beta.take() {
+                // The newest β is wanted; what was trained is shown all the same, for the eye to follow.
+                self.snapshot(clock);
+                if let Err(sentence) = self.retrain(beta) {
+                    self.outbox.push(Event::Refused(sentence));
+                }
+                return Pace::Now;
+            }
+        }
+        let is_hidden = self.run.as_ref().is_none_or(|run| run.is_silent && run.is_playing);
+        if self.is_changed && !is_hidden && self.in_flight.len() < IN_FLIGHT {
+            let now = clock();
+            if now >= self.next_snapshot {
+                self.snapshot(clock);
+            } else if pace != Pace::Now {
+                let wait = self.next_snapshot - now;
+                pace = Pace::After(if let Pace::After(ms) = pace { ms.min(wait) } else { wait });
+            }
+        }
+        pace
+    }
+
+    /// Makes the updates that are due, for at most [`STRETCH`].
+    fn train(&mut self, now: f64, clock: &dyn Fn() -> f64) -> Pace {
+        let since = now - std::mem::replace(&mut self.paced, now);
+        let Some(run) = self.run.as_mut().filter(|run| run.is_playing) else { return Pace::Idle };
+        let is_page_behind = self.in_flight.first().is_some_and(|(_, sent)| now - sent > PATIENCE);
+        if is_page_behind && !run.is_silent {
+            self.allowance = 0.0;
+            return Pace::Idle;
+        }
+        let speed = self.speed.filter(|_| !run.is_silent).map(f64::from);
+        if let Some(speed) = speed {
+            // No more than a quarter of a second is made up for after a pause.
+            self.allowance = (self.allowance + since.clamp(0.0, 250.0) * speed / 1000.0).min((speed / 4.0).max(1.0));
+        }
+        let mut end = now;
+        while run.is_playing && end - now < STRETCH && (speed.is_none() || self.allowance >= 1.0) {
+            self.allowance -= 1.0;
+            run.update();
+            self.is_changed = true;
+            end = clock();
+        }
+        run.training_ms += end - now;
+        match speed {
+            _ if !run.is_playing => Pace::Idle,
+            Some(speed) if self.allowance < 1.0 => Pace::After((1.0 - self.allowance) * 1000.0 / speed),
+            _ => Pace::Now,
+        }
+    }
+
+    /// Evaluates everything the page shows and puts it in the outbox.
+    fn snapshot(&mut self, clock: &dyn Fn() -> f64) {
+        let Some(run) = &mut self.run else { return };
+        let begin = clock();
+        self.snapshots += 1;
+        self.outbox.push(Event::Snapshot(Box::new(run.snapshot(self.snapshots, self.runs, &self.show))));
+        self.is_changed = false;
+        let end = clock();
+        self.in_flight.push((self.snapshots, end));
+        // At most half of the time goes into showing.
+        self.next_snapshot = (begin + FRAME).max(end + (end - begin));
+    }
+}
+
+const NOTHING: &str = "Nothing has been loaded yet.";
+
+impl Run {
+    fn trainer(&self) -> &Trainer {
+        match &self.subject {
+            Subject::Training(trainer) => trainer,
+            Subject::Given { .. } => unreachable!("only runs that train are asked for their trainer"),
+        }
+    }
+
+    fn trainer_mut(&mut self) -> &mut Trainer {
+        match &mut self.subject {
+            Subject::Training(trainer) => trainer,
+            Subject::Given { .. } => unreachable!("only runs that train are asked for their trainer"),
+        }
+    }
+
+    /// Plays; a run that had ended for as long again.
+    fn go_on(&mut self) {
+        if self.trainer().updates() >= self.last_update {
+            self.last_update = self.trainer().updates().saturating_add(self.setup.config.updates());
+        }
+        (self.is_playing, self.is_silent) = (true, false);
+    }
+
+    fn update(&mut self) {
+        self.trainer_mut().update();
+        let updates = self.trainer().updates();
+        if updates >= self.last_update {
+            self.is_playing = false;
+        }
+        let every = self.setup.config.updates().div_ceil(CURVE_POINTS);
+        if updates.is_multiple_of(every) || updates == self.last_update {
+            self.add_curve_point();
+        }
+    }
+
+    fn ensemble(&self) -> Ensemble {
+        match &self.subject {
+            Subject::Training(trainer) => trainer.ensemble(),
+            Subject::Given { ensemble, .. } => ensemble.clone(),
+        }
+    }
+
+    /// p(c|s) of the run's own observer.
+    fn own_contexts(&mut self, ensemble: &Ensemble) -> Contexts {
+        let Config { observer, horizon, seed, .. } = self.setup.config;
+        match &mut self.subject {
+            Subject::Training(trainer) => trainer.contexts(),
+            Subject::Given { grid, .. } => observer.contexts(grid, ensemble, horizon, seed),
+        }
+    }
+
+    fn add_curve_point(&mut self) {
+        let Subject::Training(trainer) = &self.subject else { return };
+        let (update, beta) = (trainer.updates(), trainer.config().beta);
+        let ensemble = self.ensemble();
+        let clone = ensemble.cloned(&self.own_contexts(&ensemble));
+        let horizon = self.setup.config.horizon;
+        let mut solver = Solver::new(self.subject.grid());
+        let experts: Vec<Returns> =
+            ensemble.policies().iter().map(|policy| solver.evaluate(policy, horizon).returns).collect();
+        let clone = solver.evaluate(&clone, horizon).returns;
+        self.curve.push(CurvePoint { update, beta, ensemble: Returns::mean(&experts), clone });
+    }
+
+    fn snapshot(&mut self, number: u32, run: u32, show: &[ObserverChoice]) -> Snapshot {
+        let Config { observer: own, horizon, seed, .. } = self.setup.config;
+        let ensemble = self.ensemble();
+        let own_contexts = self.own_contexts(&ensemble);
+        let grid = self.subject.grid();
+        let mut solver = Solver::new(grid);
+        let mut view = |policy: &Policy| policy_view(policy, solver.evaluate(policy, horizon));
+        let experts = ensemble.policies().iter().map(&mut view).collect();
+        let mut clones: Vec<CloneView> = Vec::new();
+        for observer in std::iter::once(own).chain(show.iter().copied()) {
+            if clones.iter().any(|clone| clone.observer == observer) {
+                continue;
+            }
+            let contexts =
+                if observer == own { own_contexts.clone() } else { observer.contexts(grid, &ensemble, horizon, seed) };
+            clones.push(CloneView {
+                observer,
+                view: view(&ensemble.cloned(&contexts)),
+                contexts: contexts.as_slice().iter().map(|&p| p as f32).collect(),
+            });
+        }
+        let (update, beta, digest) = match &self.subject {
+            Subject::Training(trainer) => (trainer.updates(), trainer.config().beta, trainer.digest()),
+            Subject::Given { .. } => (0, self.setup.config.beta, 0),
+        };
+        let state = match &self.subject {
+            Subject::Given { .. } => RunState::Given,
+            _ if self.is_playing => RunState::Playing,
+            _ if update >= self.last_update => RunState::Finished,
+            _ => RunState::Paused,
+        };
+        Snapshot {
+            number,
+            run,
+            state,
+            update,
+            last_update: self.last_update,
+            beta,
+            digest,
+            training_ms: self.training_ms,
+            experts,
+            clones,
+            curve: std::mem::take(&mut self.curve),
+        }
+    }
+}
+
+fn policy_view(policy: &Policy, value: Value) -> PolicyView {
+    PolicyView {
+        policy: policy.rows().iter().map(|row| row.map(|p| p as f32)).collect(),
+        hitting_time: value.hitting_time.iter().map(|&h| h as f32).collect(),
+        returns: value.returns,
+    }
+}

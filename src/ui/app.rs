@@ -1,0 +1,335 @@
+//! The page: what it knows, what it hears from the session, and where its parts stand.
+
+use egui::{CentralPanel, Frame, Margin, RichText, ScrollArea, Ui};
+
+use super::board::Shown;
+use super::heatmap::Pictures;
+use super::panels::Touched;
+use super::theme::{self, GAP, NARROW, Palette, SPACE, WIDE};
+use super::{controls, headline, help, toolbar};
+use crate::ape::Config;
+use crate::ape::observer::ObserverChoice;
+use crate::experiment::{PRESETS, Setup};
+use crate::lab::{Command, Event, Link, PROTOCOL, Snapshot, Started};
+
+/// What moving β does.
+#[derive(Clone, Copy, PartialEq)]
+pub enum BetaMode {
+    /// A whole run from the seed.
+    Retrain,
+    /// The training goes on.
+    Continue,
+}
+
+/// How the page looks at a run; nothing here changes the run.
+pub struct View {
+    /// Place in [`crate::mdp::RETURN_KINDS`] of the return that is shown.
+    pub kind: usize,
+    /// Who clones, one for each clone panel; the first is in the headline too.
+    pub clones: Vec<ObserverChoice>,
+    pub beta_mode: BetaMode,
+    /// Place in [`toolbar::SPEEDS`].
+    pub speed: usize,
+    /// The cell marked in every panel.
+    pub cell: Option<usize>,
+    pub is_help_open: bool,
+}
+
+/// The session at the other end of the link, as far as the page knows.
+enum Session {
+    Starting,
+    Ready,
+    /// It is gone; the sentence says how.
+    Failed(String),
+}
+
+/// The page.
+pub struct App {
+    link: Box<dyn Link>,
+    session: Session,
+    /// What the controls say; the session is told of every change.
+    setup: Setup,
+    /// The place in [`PRESETS`] that `setup` was taken from, as long as nothing was changed since.
+    preset: Option<usize>,
+    /// The newest run that the session has begun.
+    started: Option<Started>,
+    /// What is on the page: a run, its grid, its latest snapshot and its curve so far.
+    shown: Option<Shown>,
+    /// A sentence from the session about something it would not do.
+    notice: Option<String>,
+    pub view: View,
+    pictures: Pictures,
+    /// The newest snapshot that the session has been told is drawn.
+    seen: u32,
+}
+
+impl App {
+    /// Opens the page on the first preset; training starts when the session is ready.
+    pub fn new(ctx: &egui::Context, link: Box<dyn Link>) -> App {
+        theme::install(ctx);
+        let mut app = App {
+            link,
+            session: Session::Starting,
+            setup: Setup::default(),
+            preset: None,
+            started: None,
+            shown: None,
+            notice: None,
+            view: View {
+                kind: 0,
+                clones: Vec::new(),
+                beta_mode: BetaMode::Retrain,
+                speed: 5,
+                cell: None,
+                is_help_open: false,
+            },
+            pictures: Pictures::default(),
+            seen: 0,
+        };
+        app.load_preset(0);
+        app
+    }
+
+    /// What the controls say.
+    pub fn setup(&self) -> &Setup {
+        &self.setup
+    }
+
+    pub fn preset(&self) -> Option<usize> {
+        self.preset
+    }
+
+    /// The run on the page and its latest snapshot.
+    pub fn shown(&self) -> Option<(&Started, &Snapshot)> {
+        self.shown.as_ref().map(|shown| (&shown.started, &shown.snapshot))
+    }
+
+    /// Whether a run has begun that has not shown anything yet.
+    pub fn is_retraining(&self) -> bool {
+        let begun = self.started.as_ref().map(|started| started.run);
+        matches!(self.session, Session::Ready) && begun != self.shown.as_ref().map(|shown| shown.snapshot.run)
+    }
+
+    /// Sends a command; while there is no session, none is needed: it will be told everything.
+    pub fn send(&mut self, command: Command) {
+        if matches!(self.session, Session::Ready) {
+            self.link.send(&command);
+        }
+    }
+
+    pub fn load_preset(&mut self, index: usize) {
+        self.setup = (PRESETS[index].setup)();
+        self.preset = Some(index);
+        self.show_clones_of(self.setup.config.observer);
+        self.load();
+    }
+
+    /// Trains with another configuration; a given ensemble is left for it.
+    pub fn reconfigure(&mut self, config: Config) {
+        if config.observer != self.setup.config.observer {
+            self.show_clones_of(config.observer);
+        }
+        self.setup.config = config;
+        self.setup.ensemble = None;
+        self.preset = None;
+        self.load();
+    }
+
+    pub fn set_beta(&mut self, beta: f64) {
+        if beta != self.setup.config.beta {
+            self.setup.config.beta = beta;
+            self.preset = None;
+            self.send(headline::beta_command(self.view.beta_mode, beta));
+        }
+    }
+
+    fn load(&mut self) {
+        self.notice = None;
+        self.send(Command::Load { setup: Box::new(self.setup.clone()), play: true });
+    }
+
+    /// The clone that is trained against, and the honest one or the blind one beside it.
+    fn show_clones_of(&mut self, observer: ObserverChoice) {
+        let beside =
+            if observer == ObserverChoice::OCCUPANCY { ObserverChoice::UNIFORM } else { ObserverChoice::OCCUPANCY };
+        self.show_clones(vec![observer, beside]);
+    }
+
+    fn show_clones(&mut self, clones: Vec<ObserverChoice>) {
+        self.view.clones = clones;
+        self.send(Command::Show(self.view.clones.clone()));
+    }
+
+    /// Takes in what the session has said.
+    fn hear(&mut self) {
+        while let Some(event) = self.link.receive() {
+            match event {
+                Ok(Event::Ready { protocol }) if protocol == PROTOCOL => {
+                    self.session = Session::Ready;
+                    self.seen = 0;
+                    self.send(Command::Speed(toolbar::SPEEDS[self.view.speed]));
+                    self.send(Command::Show(self.view.clones.clone()));
+                    self.load();
+                }
+                Ok(Event::Ready { .. }) => {
+                    let sentence = "The worker is of another version than the page: reload the page.";
+                    self.session = Session::Failed(sentence.to_owned());
+                }
+                Ok(Event::Started(started)) => self.started = Some(*started),
+                Ok(Event::Snapshot(snapshot)) => self.take(*snapshot),
+                Ok(Event::Refused(sentence)) => self.notice = Some(sentence),
+                Err(sentence) => self.session = Session::Failed(sentence),
+            }
+        }
+    }
+
+    /// Puts a snapshot on the page.
+    fn take(&mut self, mut snapshot: Snapshot) {
+        let points = std::mem::take(&mut snapshot.curve);
+        match &mut self.shown {
+            Some(shown) if shown.started.run == snapshot.run && shown.snapshot.number < snapshot.number => {
+                shown.curve.extend(points);
+                shown.snapshot = snapshot;
+            }
+            _ => {
+                // The first of a run: its own grid and optimal policy come with it.
+                let Some(started) = self.started.clone().filter(|started| started.run == snapshot.run) else { return };
+                self.shown = Shown::new(started, snapshot, points);
+            }
+        }
+    }
+}
+
+impl eframe::App for App {
+    fn logic(&mut self, _ctx: &egui::Context, _frame: &mut eframe::Frame) {
+        self.hear();
+    }
+
+    fn ui(&mut self, ui: &mut Ui, _frame: &mut eframe::Frame) {
+        self.show(ui);
+        let newest = self.shown.as_ref().map_or(0, |shown| shown.snapshot.number);
+        if newest > self.seen {
+            self.seen = newest;
+            self.send(Command::Seen(newest));
+        }
+    }
+}
+
+impl App {
+    /// Draws the page.
+    pub fn show(&mut self, ui: &mut Ui) {
+        let width = ui.available_width();
+        if width < NARROW {
+            theme::enlarge_targets(ui);
+        }
+        let margin = if width < NARROW { 10 } else { SPACE as i8 };
+        let sheet = Frame::new().fill(Palette::of(ui).ground).inner_margin(Margin::symmetric(margin, 10));
+        if width < WIDE {
+            CentralPanel::no_frame().frame(sheet).show(ui, |ui| {
+                ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
+                    self.show_top(ui);
+                    self.show_board(ui, Shown::show_stacked);
+                    ui.add_space(GAP);
+                    theme::card(ui).show(ui, |ui| {
+                        ui.set_width(ui.available_width());
+                        controls::show(ui, self);
+                    });
+                });
+            });
+        } else {
+            egui::Panel::top("top").frame(sheet).show_separator_line(false).show(ui, |ui| self.show_top(ui));
+            egui::Panel::left("controls")
+                .exact_size(272.0)
+                .resizable(false)
+                .show_separator_line(false)
+                .frame(Frame::new().fill(Palette::of(ui).ground).inner_margin(Margin {
+                    left: margin,
+                    right: 4,
+                    top: 0,
+                    bottom: 10,
+                }))
+                .show(ui, |ui| {
+                    theme::card(ui).show(ui, |ui| {
+                        ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| controls::show(ui, self));
+                    });
+                });
+            let rest = Frame::new().fill(Palette::of(ui).ground).inner_margin(Margin {
+                left: 12,
+                right: margin,
+                top: 0,
+                bottom: 10,
+            });
+            CentralPanel::no_frame().frame(rest).show(ui, |ui| self.show_board(ui, Shown::show_planned));
+        }
+        self.show_help(ui);
+    }
+
+    fn show_top(&mut self, ui: &mut Ui) {
+        toolbar::show(ui, self);
+        ui.add_space(2.0);
+        self.show_messages(ui);
+        let palette = Palette::of(ui);
+        ui.horizontal_wrapped(|ui| {
+            ui.spacing_mut().item_spacing.x = SPACE;
+            ui.label(RichText::new(headline::sentence(self)).text_style(theme::strong()));
+            ui.label(RichText::new(headline::progress(self)).small().color(palette.muted));
+        });
+        ui.add_space(4.0);
+        theme::card(ui).show(ui, |ui| {
+            ui.set_width(ui.available_width());
+            headline::show(ui, self);
+        });
+    }
+
+    /// What has gone wrong, and what can be done about it.
+    fn show_messages(&mut self, ui: &mut Ui) {
+        let palette = Palette::of(ui);
+        let message = |ui: &mut Ui, sentence: &str, button: &str| -> bool {
+            theme::card(ui)
+                .stroke(egui::Stroke::new(1.5, palette.warning))
+                .show(ui, |ui| {
+                    ui.horizontal_wrapped(|ui| {
+                        let label = ui.label(RichText::new(sentence).color(palette.warning));
+                        ui.ctx().accesskit_node_builder(label.id, |node| node.set_role(egui::Role::Alert));
+                        ui.button(button).clicked()
+                    })
+                    .inner
+                })
+                .inner
+        };
+        if let Session::Failed(sentence) = &self.session {
+            let sentence = format!("{sentence} What is on the page stays; training needs a new worker.");
+            if message(ui, &sentence, "Restart the worker") {
+                self.session = Session::Starting;
+                self.started = None;
+                self.link.restart();
+            }
+        }
+        if let Some(sentence) = self.notice.clone()
+            && message(ui, &sentence, "Dismiss")
+        {
+            self.notice = None;
+        }
+    }
+
+    /// The run that is shown, by `draw`; then what the visitor did to it.
+    fn show_board(&mut self, ui: &mut Ui, draw: fn(&Shown, &mut Ui, &View, &mut Pictures) -> Touched) {
+        let Some(shown) = &self.shown else {
+            ui.label(RichText::new("The first policies are on their way …").color(Palette::of(ui).muted));
+            return;
+        };
+        let touched = draw(shown, ui, &self.view, &mut self.pictures);
+        if touched.cell.is_some() {
+            self.view.cell = touched.cell;
+        }
+        if let Some(clones) = touched.clones {
+            self.show_clones(clones);
+        }
+    }
+
+    fn show_help(&mut self, ui: &mut Ui) {
+        if self.view.is_help_open && help::show(ui) {
+            self.view.is_help_open = false;
+        }
+    }
+}

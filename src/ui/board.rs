@@ -1,0 +1,92 @@
+//! The run that is shown: its panels, chart and inspector, and where they stand.
+
+use egui::{Ui, UiBuilder, vec2};
+
+use super::app::View;
+use super::heatmap::{self, Pictures};
+use super::panels::{self, Panel, Plan, Touched};
+use super::theme::{self, GAP, NARROW};
+use super::{chart, inspector};
+use crate::lab::{CurvePoint, Snapshot, Started};
+use crate::mdp::Grid;
+
+/// A run as it is shown: its grid, its latest snapshot and its curve so far.
+pub struct Shown {
+    pub started: Started,
+    pub snapshot: Snapshot,
+    pub curve: Vec<CurvePoint>,
+    grid: Grid,
+}
+
+impl Shown {
+    /// Nothing when the run's grid is no good, which a session does not let happen.
+    pub fn new(started: Started, snapshot: Snapshot, curve: Vec<CurvePoint>) -> Option<Shown> {
+        let given = started.setup.ensemble.as_ref().map(|ensemble| &ensemble.grid);
+        let grid = Grid::new(given.unwrap_or(&started.setup.grid).clone()).ok()?;
+        Some(Shown { started, snapshot, curve, grid })
+    }
+
+    /// Everything below one another, for narrow pages.
+    pub fn show_stacked(&self, ui: &mut Ui, view: &View, pictures: &mut Pictures) -> Touched {
+        ui.add_space(GAP);
+        heatmap::color_bar(ui);
+        let width = ui.available_width();
+        let columns = if width < NARROW { 2 } else { 3 };
+        let picture = ((width - 2.0 * GAP * (columns - 1) as f32) / columns as f32).floor();
+        let size = vec2(picture, picture * self.grid.rows() as f32 / self.grid.cols() as f32);
+        let plan = Plan { columns, picture: size, rest: None };
+        let panels = panels::list(&self.started, &self.snapshot, view);
+        let touched = self.show_panels(ui, &panels, &plan, view, pictures);
+        ui.add_space(GAP);
+        theme::card(ui).show(ui, |ui| {
+            ui.set_width(ui.available_width());
+            inspector::show(ui, &panels, &self.grid, view.cell);
+        });
+        ui.add_space(GAP);
+        theme::card(ui).show(ui, |ui| {
+            ui.set_height(260.0);
+            self.show_chart(ui, view);
+        });
+        touched
+    }
+
+    /// Panels as large as the page allows, with chart and inspector beside or below them.
+    pub fn show_planned(&self, ui: &mut Ui, view: &View, pictures: &mut Pictures) -> Touched {
+        heatmap::color_bar(ui);
+        let panels = panels::list(&self.started, &self.snapshot, view);
+        let area = ui.available_rect_before_wrap();
+        let plan = panels::plan(ui, area, panels.len(), &self.grid);
+        let touched = self.show_panels(ui, &panels, &plan, view, pictures);
+        let rest = plan.rest.unwrap_or_else(|| ui.available_rect_before_wrap());
+        let (mut first, second) = if rest.width() > 700.0 {
+            rest.split_left_right_at_fraction(0.5)
+        } else {
+            rest.split_top_bottom_at_fraction(0.5)
+        };
+        if first.right() < second.right() {
+            first.max.x -= GAP;
+        } else {
+            first.max.y -= GAP;
+        }
+        let card = |ui: &mut Ui, place, contents: &dyn Fn(&mut Ui)| {
+            ui.scope_builder(UiBuilder::new().max_rect(place), |ui| {
+                theme::card(ui).show(ui, |ui| {
+                    ui.set_min_size(ui.available_size());
+                    contents(ui);
+                });
+            });
+        };
+        card(ui, first, &|ui| self.show_chart(ui, view));
+        card(ui, second, &|ui| inspector::show(ui, &panels, &self.grid, view.cell));
+        touched
+    }
+
+    fn show_panels(&self, ui: &mut Ui, panels: &[Panel], plan: &Plan, view: &View, pictures: &mut Pictures) -> Touched {
+        panels::show(ui, panels, plan, &self.grid, view, u64::from(self.snapshot.number), pictures)
+    }
+
+    fn show_chart(&self, ui: &mut Ui, view: &View) {
+        let observer = self.started.setup.config.observer.to_string();
+        chart::show(ui, &self.curve, &self.snapshot, &observer, view);
+    }
+}

@@ -1,0 +1,130 @@
+//! The controls: observer, number of experts, seed, and every other field of the configuration.
+
+use egui::{CollapsingHeader, ComboBox, DragValue, RichText, Ui};
+
+use super::app::App;
+use super::theme::Palette;
+use super::toolbar;
+use super::widgets::{Icon, icon_button, section};
+use crate::ape::observer::ObserverChoice;
+use crate::ape::{Config, FIELDS, Field, Kind};
+
+/// Fields that stand elsewhere on the page; the rest is under "advanced".
+const ELSEWHERE: [&str; 4] = ["experts", "beta", "observer", "seed"];
+
+pub fn show(ui: &mut Ui, app: &mut App) {
+    let mut config = app.setup().config.clone();
+    let is_given = app.setup().ensemble.is_some();
+    if is_given {
+        let text = "This preset shows a given ensemble. Changing anything here trains one.";
+        ui.label(RichText::new(text).small().color(Palette::of(ui).muted));
+    }
+    section(ui, "Observer");
+    ui.label(RichText::new("Who do the experts expect to clone them?").small().color(Palette::of(ui).muted));
+    for choice in ObserverChoice::all() {
+        let is_chosen = config.observer.model().name == choice.model().name;
+        let text = format!("{}: {}", choice.model().name, choice.model().title);
+        let response = ui.radio(is_chosen, text).on_hover_text(choice.model().summary);
+        if response.clicked() && !is_chosen {
+            config.observer = choice;
+        }
+    }
+    section(ui, "Experts");
+    ui.horizontal_wrapped(|ui| {
+        ui.spacing_mut().item_spacing.x = 2.0;
+        for n in 1..=Config::MAX_EXPERTS {
+            let button = egui::Button::selectable(config.experts == n, n.to_string()).frame_when_inactive(true);
+            let response = ui.add(button);
+            response.widget_info(|| {
+                let name = if n == 1 { "1 expert".to_owned() } else { format!("{n} experts") };
+                egui::WidgetInfo::selected(egui::Role::RadioButton, true, config.experts == n, name)
+            });
+            if response.on_hover_text(help("experts")).clicked() {
+                config.experts = n;
+            }
+        }
+    });
+    section(ui, "Seed");
+    ui.horizontal(|ui| {
+        let drag = DragValue::new(&mut config.seed).speed(0.2).update_while_editing(false);
+        ui.add(drag).accessible_name("Seed").on_hover_text(help("seed"));
+        if icon_button(ui, Icon::Dice, "Next seed", false).clicked() {
+            config.seed = config.seed.wrapping_add(1);
+        }
+    });
+    if ui.ctx().content_rect().width() < super::theme::NARROW {
+        section(ui, "Speed");
+        toolbar::speed(ui, app);
+    }
+    ui.add_space(6.0);
+    CollapsingHeader::new("Advanced").show(ui, |ui| {
+        let text =
+            "Every other field of the configuration. Where it differs from the paper, the paper's value stands below.";
+        ui.label(RichText::new(text).small().color(Palette::of(ui).muted));
+        for field in FIELDS.iter().filter(|field| !ELSEWHERE.contains(&field.name)) {
+            show_field(ui, field, &mut config);
+        }
+        if ui.button("All as in the paper").clicked() {
+            config = Config { seed: config.seed, ..Config::paper() };
+        }
+    });
+    if config != app.setup().config {
+        app.reconfigure(config);
+    }
+}
+
+fn help(name: &str) -> &'static str {
+    Field::find(name).map_or("", |field| field.help)
+}
+
+fn show_field(ui: &mut Ui, field: &Field, config: &mut Config) {
+    let palette = Palette::of(ui);
+    ui.add_space(2.0);
+    ui.label(RichText::new(field.label).small());
+    ui.horizontal(|ui| {
+        let tip = format!("{} Paper: {}. Expected: {}.", field.help, field.paper, field.expected());
+        match &field.kind {
+            Kind::Real { low, high, get, set } => {
+                let mut value = get(config);
+                let speed = (value.abs() * 0.01).max(0.0005);
+                let drag = DragValue::new(&mut value)
+                    .range(*low..=*high)
+                    .speed(speed)
+                    .max_decimals(6)
+                    .update_while_editing(false);
+                if ui.add(drag).accessible_name(field.label).on_hover_text(tip).changed() {
+                    set(config, value);
+                }
+            }
+            Kind::Whole { low, high, get, set } => {
+                let mut value = get(config);
+                let speed = (f64::from(value) * 0.01).max(0.2);
+                let drag = DragValue::new(&mut value)
+                    .range(*low..=*high)
+                    .speed(speed)
+                    .update_while_editing(false);
+                if ui.add(drag).accessible_name(field.label).on_hover_text(tip).changed() {
+                    set(config, value);
+                }
+            }
+            Kind::Word { options, get, set } => {
+                let chosen = get(config);
+                let response = ComboBox::from_id_salt(field.name)
+                    .selected_text(chosen.clone())
+                    .show_ui(ui, |ui| {
+                        for option in options() {
+                            if ui.selectable_label(option == chosen, &option).clicked() {
+                                set(config, &option);
+                            }
+                        }
+                    })
+                    .response;
+                response.accessible_name(field.label).on_hover_text(tip);
+            }
+        }
+        let mut paper = Config::default();
+        let is_papers = field.set(&mut paper, field.paper).is_ok() && field.text(&paper) == field.text(config);
+        let mark = if is_papers { "as in the paper".to_owned() } else { format!("paper: {}", field.paper) };
+        ui.label(RichText::new(mark).small().color(if is_papers { palette.muted } else { palette.warning }));
+    });
+}

@@ -1,0 +1,175 @@
+//! What there is to see, in one sentence and four figures, and the large β slider.
+
+use egui::{RichText, Slider, Ui, vec2};
+
+use super::app::{App, BetaMode, View};
+use super::numbers;
+use super::theme::{self, Palette, SPACE};
+use super::widgets::{choose, spoken};
+use crate::ape::Config;
+use crate::lab::{Command, RunState, Snapshot, Started};
+use crate::mdp::{RETURN_KINDS, Returns};
+
+/// The figures that the headline is about.
+struct Headline {
+    ensemble: Returns,
+    clone: Returns,
+    optimal: Returns,
+    /// The observer of the first clone panel.
+    observer: String,
+}
+
+impl Headline {
+    fn of(started: &Started, snapshot: &Snapshot, view: &View) -> Option<Headline> {
+        let observer = view.clones.first()?;
+        let clone = snapshot.clones.iter().find(|clone| clone.observer == *observer)?;
+        Some(Headline {
+            ensemble: snapshot.ensemble(),
+            clone: clone.view.returns,
+            optimal: started.optimal.returns,
+            observer: observer.to_string(),
+        })
+    }
+}
+
+/// The β slider with its mode; then the figures, beside it where there is room.
+pub fn show(ui: &mut Ui, app: &mut App) {
+    let is_narrow = ui.available_width() < theme::NARROW;
+    let show_parts = |ui: &mut Ui, app: &mut App| {
+        ui.vertical(|ui| beta(ui, app, is_narrow));
+        if !is_narrow {
+            ui.add_space(SPACE);
+        }
+        ui.vertical(|ui| figures(ui, app));
+    };
+    if is_narrow {
+        show_parts(ui, app);
+    } else {
+        ui.horizontal_top(|ui| show_parts(ui, app));
+    }
+}
+
+fn beta(ui: &mut Ui, app: &mut App, is_narrow: bool) {
+    let palette = Palette::of(ui);
+    let width = if is_narrow { ui.available_width() } else { 330.0 };
+    ui.set_width(width);
+    let is_given = app.setup().ensemble.is_some();
+    ui.add_enabled_ui(!is_given, |ui| {
+        ui.horizontal(|ui| {
+            ui.label(RichText::new("β").text_style(theme::figure()));
+            ui.spacing_mut().slider_width = ui.available_width() - 76.0;
+            ui.spacing_mut().interact_size.y = 36.0;
+            ui.spacing_mut().slider_rail_height = 8.0;
+            let mut beta = app.setup().config.beta;
+            let slider = Slider::new(&mut beta, 0.0..=1.0)
+                .clamping(egui::SliderClamping::Edits)
+                .step_by(0.01)
+                .fixed_decimals(2)
+                .drag_value_speed(0.01);
+            let response = ui.add(slider).accessible_name("β");
+            let help = "Weight of the clone's failure: the experts climb J = E[ensemble] − β E[clone] (Eq. 3). \
+                        At 0 they care only about the goal; the paper's value is 0.6.";
+            if response.on_hover_text(help).changed() {
+                app.set_beta(beta.clamp(0.0, Config::MAX_BETA));
+            }
+        });
+        ui.horizontal_wrapped(|ui| {
+            let mut mode = app.view.beta_mode;
+            let options = [
+                (BetaMode::Retrain, "retrain", "Every new β trains a whole run from the seed"),
+                (BetaMode::Continue, "continue", "The training under way goes on with the new β"),
+            ];
+            ui.label(RichText::new("moving β:").small().color(palette.muted));
+            if choose(ui, "Moving β", &mut mode, &options) {
+                app.view.beta_mode = mode;
+            }
+        });
+    });
+}
+
+fn figures(ui: &mut Ui, app: &mut App) {
+    let palette = Palette::of(ui);
+    let headline = app.shown().and_then(|(started, snapshot)| Headline::of(started, snapshot, &app.view));
+    let Some(headline) = headline else {
+        ui.label(RichText::new("Waiting for the first figures …").color(palette.muted));
+        return;
+    };
+    let kind = &RETURN_KINDS[app.view.kind];
+    let get = kind.get;
+    let (ensemble, clone, optimal) = (get(&headline.ensemble), get(&headline.clone), get(&headline.optimal));
+    ui.horizontal_wrapped(|ui| {
+        ui.spacing_mut().item_spacing = vec2(22.0, 4.0);
+        let unit = if kind.is_steps { " steps" } else { "" };
+        for (name, color, value, help) in [
+            ("Ensemble".to_owned(), palette.accent, numbers::of_kind(kind, ensemble), "Mean of the experts' returns."),
+            (
+                format!("Clone ({})", headline.observer),
+                palette.clone,
+                numbers::of_kind(kind, clone),
+                "Return of the policy that an observer of the demonstrations ends up with: the first clone panel.",
+            ),
+            ("Optimal".to_owned(), palette.ink, numbers::of_kind(kind, optimal), "The best any policy can do."),
+            (
+                "Clone ÷ ensemble".to_owned(),
+                palette.ink,
+                if kind.is_steps { format!("{}×", numbers::decimal(clone / ensemble, 1)) } else { "–".to_owned() },
+                "How many times as many steps the clone needs.",
+            ),
+        ] {
+            ui.vertical(|ui| {
+                ui.spacing_mut().item_spacing.y = 0.0;
+                ui.label(RichText::new(&name).small().color(palette.muted));
+                let unit = if name.starts_with("Clone ÷") { "" } else { unit };
+                let words = format!("{name} {} return: {value}{unit}", kind.label);
+                spoken(ui, RichText::new(&value).text_style(theme::figure()).color(color), &words).on_hover_text(help);
+            });
+        }
+    });
+    ui.horizontal_wrapped(|ui| {
+        ui.label(RichText::new("return:").small().color(palette.muted));
+        let options: Vec<(usize, &str, &str)> =
+            RETURN_KINDS.iter().enumerate().map(|(index, kind)| (index, kind.label, kind.help)).collect();
+        choose(ui, "Return", &mut app.view.kind, &options);
+    });
+}
+
+/// The sentence under the title: what a visitor sees, with its numbers.
+pub fn sentence(app: &App) -> String {
+    let Some((started, snapshot)) = app.shown() else { return String::new() };
+    let Some(headline) = Headline::of(started, snapshot, &app.view) else { return String::new() };
+    let n = snapshot.experts.len();
+    let experts = if n == 1 { "The expert reaches".to_owned() } else { format!("The {n} experts reach") };
+    let steps = |returns: &Returns| numbers::decimal(-returns.horizon_return, 0);
+    let success = numbers::percent(headline.clone.success);
+    let clone = if headline.clone.success < 0.9 {
+        format!("their clone ({}) gets lost: it arrives in {success} of episodes", headline.observer)
+    } else {
+        format!("their clone ({}) in {}", headline.observer, steps(&headline.clone))
+    };
+    format!("{experts} the goal in {} steps; {clone}.", steps(&headline.ensemble))
+}
+
+/// How far training is, in words.
+pub fn progress(app: &App) -> String {
+    let Some((_, snapshot)) = app.shown() else { return "starting".to_owned() };
+    let of = format!("update {} of {}", snapshot.update, snapshot.last_update);
+    match snapshot.state {
+        _ if app.is_retraining() => "retraining …".to_owned(),
+        RunState::Given => "given ensemble, nothing to train".to_owned(),
+        RunState::Playing => format!("training, {of}"),
+        RunState::Paused => format!("paused at {of}"),
+        RunState::Finished => format!("trained, {of}, {} of work", seconds(snapshot.training_ms)),
+    }
+}
+
+fn seconds(milliseconds: f64) -> String {
+    if milliseconds < 1000.0 { format!("{milliseconds:.0} ms") } else { format!("{:.1} s", milliseconds / 1000.0) }
+}
+
+/// Sends what a changed β asks for.
+pub fn beta_command(mode: BetaMode, beta: f64) -> Command {
+    match mode {
+        BetaMode::Retrain => Command::Retrain { beta },
+        BetaMode::Continue => Command::Continue { beta },
+    }
+}

@@ -1,0 +1,181 @@
+//! One policy on one grid: the colour of a cell is its capped hitting time, arrows are the policy.
+//!
+//! A picture is tessellated once and kept until what it shows or where it stands changes.
+
+use std::collections::HashMap;
+use std::sync::Arc;
+
+use egui::epaint::{Mesh, Tessellator};
+use egui::{Color32, Id, Pos2, Rect, Role, Sense, Shape, Stroke, StrokeKind, Ui, Vec2, WidgetInfo, pos2, vec2};
+
+use super::theme::{self, Palette};
+use crate::lab::PolicyView;
+use crate::mdp::{Action, CAP, Grid};
+
+/// Pictures of the last frame, by panel.
+#[derive(Default)]
+pub struct Pictures {
+    kept: HashMap<Id, (Key, Arc<Mesh>)>,
+}
+
+/// All that a picture depends on besides the policy; `version` stands for that.
+#[derive(Clone, Copy, PartialEq)]
+struct Key {
+    version: u64,
+    rect: Rect,
+    is_dark: bool,
+    pixels_per_point: f32,
+}
+
+/// What one heatmap shows.
+pub struct Heatmap<'a> {
+    /// Its own among all on the page.
+    pub id: Id,
+    /// Its accessible name.
+    pub name: &'a str,
+    pub grid: &'a Grid,
+    pub policy: &'a PolicyView,
+    /// Changes whenever the policy does.
+    pub version: u64,
+    /// The cell marked in every panel.
+    pub marked: Option<usize>,
+}
+
+impl Heatmap<'_> {
+    /// Draws into `rect`; returns the cell under the pointer.
+    pub fn show(self, ui: &mut Ui, rect: Rect, pictures: &mut Pictures) -> Option<usize> {
+        let response = ui.interact(rect, self.id, Sense::click());
+        response.widget_info(|| WidgetInfo::labeled(Role::Image, true, self.name));
+        let cell = rect.size() / vec2(self.grid.cols() as f32, self.grid.rows() as f32);
+        let pixels_per_point = ui.ctx().pixels_per_point();
+        let key = Key { version: self.version, rect, is_dark: ui.visuals().dark_mode, pixels_per_point };
+        let kept = pictures.kept.get(&response.id).filter(|(old, _)| *old == key);
+        let picture = kept.map(|(_, mesh)| mesh.clone()).unwrap_or_else(|| {
+            let mesh = Arc::new(self.tessellate(ui, rect, cell));
+            pictures.kept.insert(response.id, (key, mesh.clone()));
+            mesh
+        });
+        ui.painter().add(Shape::Mesh(picture));
+        if let Some(state) = self.marked.filter(|&state| state < self.grid.cells()) {
+            let mark = self.cell_rect(rect, cell, state);
+            ui.painter().rect_stroke(mark, 2.0, Stroke::new(4.0, Color32::BLACK), StrokeKind::Outside);
+            ui.painter().rect_stroke(mark, 2.0, Stroke::new(2.0, Color32::WHITE), StrokeKind::Outside);
+        }
+        if response.has_focus() {
+            let stroke = Stroke::new(2.0, Palette::of(ui).accent);
+            ui.painter().rect_stroke(rect.expand(3.0), 3.0, stroke, StrokeKind::Outside);
+        }
+        let pointed = response.hover_pos().or(response.interact_pointer_pos()).filter(|at| rect.contains(*at));
+        pointed.map(|at| {
+            let place = (at - rect.min) / cell;
+            let row = (place.y as usize).min(self.grid.rows() - 1);
+            let col = (place.x as usize).min(self.grid.cols() - 1);
+            row * self.grid.cols() + col
+        })
+    }
+
+    fn cell_rect(&self, rect: Rect, cell: Vec2, state: usize) -> Rect {
+        let (row, col) = self.grid.cell(state);
+        Rect::from_min_size(rect.min + cell * vec2(col as f32, row as f32), cell)
+    }
+
+    fn tessellate(&self, ui: &Ui, rect: Rect, cell: Vec2) -> Mesh {
+        let palette = Palette::of(ui);
+        let options = ui.ctx().tessellation_options(|options| *options);
+        let mut tessellator = Tessellator::new(
+            ui.ctx().pixels_per_point(),
+            options,
+            ui.ctx().fonts(|fonts| fonts.font_image_size()),
+            vec![],
+        );
+        let mut mesh = Mesh::default();
+        let mut add = |shape: Shape| tessellator.tessellate_shape(shape, &mut mesh);
+        // The ground shows between cells as a thin line, where there is room for one.
+        add(Shape::rect_filled(rect, 0.0, palette.ground));
+        let gap = if cell.x >= 12.0 { 0.5 } else { 0.0 };
+        for state in 0..self.grid.cells() {
+            let place = self.cell_rect(rect, cell, state).shrink(gap);
+            if self.grid.is_wall(state) {
+                add(Shape::rect_filled(place, 0.0, palette.wall));
+                continue;
+            }
+            let capped = (self.policy.hitting_time[state] / CAP as f32).min(1.0);
+            let color = theme::viridis(1.0 - capped);
+            add(Shape::rect_filled(place, 0.0, color));
+            let ink = theme::ink_on(color);
+            if state == self.grid.goal() {
+                flag(place, ink).into_iter().for_each(&mut add);
+            } else {
+                arrows(place, &self.policy.policy[state], ink).into_iter().for_each(&mut add);
+            }
+        }
+        mesh
+    }
+}
+
+/// An arrow for every move, its length the move's probability; a dot for Stay.
+fn arrows(cell: Rect, policy: &[f32; 5], ink: Color32) -> Vec<Shape> {
+    let size = cell.width().min(cell.height());
+    let center = cell.center();
+    let width = (size * 0.07).max(1.0);
+    let mut shapes = Vec::new();
+    for (action, &p) in Action::ALL.into_iter().zip(policy) {
+        // What is rarer than one time in thirty would be a speck.
+        if p < 0.03 {
+            continue;
+        }
+        if action == Action::Stay {
+            shapes.push(Shape::circle_filled(center, size * 0.17 * p.sqrt(), ink));
+            continue;
+        }
+        let (down, right) = action.direction();
+        let along = vec2(right as f32, down as f32);
+        let across = along.rot90();
+        let head = (size * 0.15).min(size * 0.46 * p);
+        let tip = center + along * size * 0.46 * p;
+        let neck = tip - along * head;
+        shapes.push(Shape::line_segment([center, neck], Stroke::new(width, ink)));
+        let wing = across * head * 0.75;
+        shapes.push(Shape::convex_polygon(vec![tip, neck + wing, neck - wing], ink, Stroke::NONE));
+    }
+    shapes
+}
+
+/// The goal: a flag.
+fn flag(cell: Rect, ink: Color32) -> Vec<Shape> {
+    let at = |x: f32, y: f32| -> Pos2 { pos2(egui::lerp(cell.x_range(), x), egui::lerp(cell.y_range(), y)) };
+    let pole = Stroke::new((cell.width() * 0.08).max(1.0), ink);
+    vec![
+        Shape::line_segment([at(0.32, 0.84), at(0.32, 0.16)], pole),
+        Shape::convex_polygon(vec![at(0.34, 0.16), at(0.8, 0.34), at(0.34, 0.54)], ink, Stroke::NONE),
+    ]
+}
+
+/// The scale of the heatmaps' colours, with its ends and what it measures.
+pub fn color_bar(ui: &mut Ui) {
+    let palette = Palette::of(ui);
+    let text = |ui: &mut Ui, words: &str| {
+        ui.label(egui::RichText::new(words).small().color(palette.muted));
+    };
+    ui.horizontal(|ui| {
+        ui.spacing_mut().item_spacing.x = 6.0;
+        text(ui, "Return from each cell, capped:");
+        text(ui, "−100");
+        let (rect, _) = ui.allocate_exact_size(vec2(110.0, 10.0), Sense::hover());
+        let mut mesh = Mesh::default();
+        const STOPS: u32 = 24;
+        for i in 0..=STOPS {
+            let t = i as f32 / STOPS as f32;
+            let x = egui::lerp(rect.x_range(), t);
+            mesh.colored_vertex(pos2(x, rect.top()), theme::viridis(t));
+            mesh.colored_vertex(pos2(x, rect.bottom()), theme::viridis(t));
+            if i > 0 {
+                let first = 2 * i - 2;
+                mesh.add_triangle(first, first + 1, first + 2);
+                mesh.add_triangle(first + 1, first + 2, first + 3);
+            }
+        }
+        ui.painter().add(Shape::mesh(mesh));
+        text(ui, "0 steps");
+    });
+}

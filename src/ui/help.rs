@@ -1,0 +1,57 @@
+//! What this page is, in a few paragraphs.
+
+use egui::{Modal, RichText, Ui};
+
+use super::theme::{self, Palette};
+
+const PARAGRAPHS: [(&str, &str); 5] = [
+    (
+        "What is trained",
+        "A few expert policies learn to cross a grid to the flag. One of them, drawn at random, acts for a whole \
+         episode. They are rewarded for arriving soon, and for the failure of whoever clones them: they climb \
+         J = E[ensemble] − β E[clone] (Zhan, Tiomkin and Abbeel, 2019).",
+    ),
+    (
+        "What the clone is",
+        "An observer sees cells and actions, not which expert acted, and learns at each cell a mixture of the \
+         experts, each weighed by p(c|s). That guess is the observer; choose it on the left.",
+    ),
+    (
+        "What you see",
+        "Colour is the expected number of steps from a cell to the flag, cut at 100; arrows are the probability of each \
+         move, a dot that of staying. All numbers are exact: nothing on the page is sampled but the training itself.",
+    ),
+    (
+        "What to try",
+        "Move β to 0: the experts agree, and the clone is as good as they are. Move it up: they disagree where it hurts, \
+         and the blind clone gets lost. Then choose the observer “occupancy”, who clones the demonstrations \
+         themselves: the protection is gone, whatever β is.",
+    ),
+    (
+        "Why that must be",
+        "Such a clone takes D + Σ m(s) h(s) steps, where D is the length of the demonstrations and m(s) the share of them \
+         cut off at s. Where none is cut off, the clone is exactly as good as the ensemble.",
+    ),
+];
+
+/// Shows the window; returns whether it was closed.
+pub fn show(ui: &mut Ui) -> bool {
+    let response = Modal::new(egui::Id::unique("help")).show(ui.ctx(), |ui| {
+        ui.set_max_width(520.0_f32.min(ui.ctx().content_rect().width() - 48.0));
+        ui.label(RichText::new("ape-lab").heading());
+        ui.label(
+            RichText::new("Policies that reach the goal and cannot be cloned. Or can they?")
+                .color(Palette::of(ui).muted),
+        );
+        egui::ScrollArea::vertical().max_height(ui.ctx().content_rect().height() - 200.0).show(ui, |ui| {
+            for (title, text) in PARAGRAPHS {
+                ui.add_space(6.0);
+                ui.label(RichText::new(title).text_style(theme::strong()));
+                ui.label(text);
+            }
+        });
+        ui.add_space(8.0);
+        ui.button("Close").clicked()
+    });
+    response.inner || response.should_close()
+}

@@ -1,0 +1,55 @@
+//! How numbers are written: with a true minus, in steps, in per cent.
+
+use crate::mdp::ReturnKind;
+
+/// A number with so many decimals and a true minus sign.
+pub fn decimal(value: f64, decimals: usize) -> String {
+    let text = format!("{:.decimals$}", value.abs());
+    let is_zero = text.bytes().all(|byte| byte == b'0' || byte == b'.');
+    if value < 0.0 && !is_zero { format!("−{text}") } else { text }
+}
+
+/// Steps or a return, short: one decimal, and powers of ten where it is huge.
+pub fn steps(value: f64) -> String {
+    if value.abs() < 9999.5 {
+        return decimal(value, 1);
+    }
+    let exponent = libm::floor(libm::log10(value.abs()));
+    let mantissa = value / libm::pow(10.0, exponent);
+    format!("{}×10{}", decimal(mantissa, 1), superscript(exponent as u32))
+}
+
+fn superscript(number: u32) -> String {
+    let digits = ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'];
+    number.to_string().bytes().map(|byte| digits[usize::from(byte - b'0')]).collect()
+}
+
+/// A probability in per cent; never 100 % for less than certainty, nor 0 % for what can happen.
+pub fn percent(p: f64) -> String {
+    match p {
+        p if p <= 0.0 => "0 %".to_owned(),
+        p if p >= 1.0 - 1e-12 => "100 %".to_owned(),
+        p if p < 0.01 => "< 1 %".to_owned(),
+        p if p > 0.99 => "> 99 %".to_owned(),
+        p => format!("{:.0} %", 100.0 * p),
+    }
+}
+
+/// A return of some kind.
+pub fn of_kind(kind: &ReturnKind, value: f64) -> String {
+    if kind.is_steps { steps(value) } else { percent(value) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_written_for_readers() {
+        assert_eq!(steps(-16.94), "−16.9");
+        assert_eq!(steps(-0.01), "0.0");
+        assert_eq!(steps(-1.67e9), "−1.7×10⁹");
+        assert_eq!(steps(12345.0), "1.2×10⁴");
+        assert_eq!([0.0, 1.0, 0.999_99, 0.001, 0.136].map(percent), ["0 %", "100 %", "> 99 %", "< 1 %", "14 %"]);
+    }
+}

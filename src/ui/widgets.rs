@@ -1,0 +1,140 @@
+//! Small pieces that several parts of the page use.
+
+use egui::{
+    Align2, Color32, Painter, Rect, Response, Role, Sense, Shape, Stroke, StrokeKind, Ui, WidgetInfo, pos2, vec2,
+};
+
+use super::theme::{self, Palette};
+
+/// The signs on icon buttons, drawn as shapes: no font has to have them.
+#[derive(Clone, Copy, PartialEq)]
+pub enum Icon {
+    Play,
+    Pause,
+    Step,
+    Reset,
+    Sun,
+    Moon,
+    Auto,
+    Help,
+    Add,
+    Remove,
+    Dice,
+}
+
+impl Icon {
+    fn paint(self, painter: &Painter, rect: Rect, color: Color32) {
+        let c = rect.center();
+        let r = rect.height() * 0.24;
+        let stroke = Stroke::new(r * 0.32, color);
+        let triangle = |x0: f32, x1: f32| {
+            let points = vec![pos2(x0, c.y - r), pos2(x1, c.y), pos2(x0, c.y + r)];
+            painter.add(Shape::convex_polygon(points, color, Stroke::NONE));
+        };
+        let bar = |x: f32| {
+            painter.rect_filled(Rect::from_center_size(pos2(x, c.y), vec2(r * 0.5, r * 2.0)), 1.0, color);
+        };
+        let arc = |from: f32, to: f32, radius: f32| {
+            let point = |i: i32| {
+                let angle = egui::lerp(from..=to, i as f32 / 20.0);
+                c + radius * egui::Vec2::angled(angle)
+            };
+            painter.add(Shape::line((0..=20).map(point).collect(), stroke));
+            point(20)
+        };
+        let text = |text: &str| {
+            let font = egui::FontId::new(r * 2.4, theme::semibold());
+            painter.text(c, Align2::CENTER_CENTER, text, font, color);
+        };
+        match self {
+            Icon::Play => triangle(c.x - r * 0.7, c.x + r),
+            Icon::Pause => {
+                bar(c.x - r * 0.5);
+                bar(c.x + r * 0.5);
+            }
+            Icon::Step => {
+                triangle(c.x - r, c.x + r * 0.5);
+                bar(c.x + r * 0.8);
+            }
+            Icon::Reset => {
+                let tip = arc(-0.9, 4.2, r);
+                let points =
+                    vec![tip + vec2(-r * 0.65, r * 0.1), tip + vec2(r * 0.5, r * 0.45), tip + vec2(r * 0.1, -r * 0.7)];
+                painter.add(Shape::convex_polygon(points, color, Stroke::NONE));
+            }
+            Icon::Sun => {
+                painter.circle_filled(c, r * 0.5, color);
+                for i in 0..8 {
+                    let ray = egui::Vec2::angled(i as f32 * std::f32::consts::FRAC_PI_4);
+                    painter.line_segment([c + ray * r * 0.8, c + ray * r * 1.15], stroke);
+                }
+            }
+            Icon::Moon => {
+                let full = (0..=24).map(|i| c + r * egui::Vec2::angled(0.6 + 4.5 * i as f32 / 24.0));
+                let bite = c + vec2(r * 0.45, -r * 0.25);
+                let hollow = (0..=24).map(|i| bite + r * 0.75 * egui::Vec2::angled(4.6 - 3.6 * i as f32 / 24.0));
+                painter.add(Shape::line(full.chain(hollow).collect(), stroke));
+            }
+            Icon::Auto => {
+                painter.circle_stroke(c, r, stroke);
+                let half = (0..=20).map(|i| c + r * egui::Vec2::angled(std::f32::consts::PI * (i as f32 / 20.0 - 0.5)));
+                painter.add(Shape::convex_polygon(half.collect(), color, Stroke::NONE));
+            }
+            Icon::Help => text("?"),
+            Icon::Add => text("+"),
+            Icon::Remove => text("×"),
+            Icon::Dice => {
+                let square = Rect::from_center_size(c, vec2(r, r) * 2.0);
+                painter.rect_stroke(square, r * 0.4, stroke, StrokeKind::Middle);
+                for at in [vec2(-0.4, -0.4), vec2(0.4, 0.4), vec2(0.0, 0.0)] {
+                    painter.circle_filled(c + at * r, r * 0.2, color);
+                }
+            }
+        }
+    }
+}
+
+/// A square button with an icon; `name` is its accessible name and its tooltip.
+pub fn icon_button(ui: &mut Ui, icon: Icon, name: &str, is_main: bool) -> Response {
+    let (rect, response) = ui.allocate_exact_size(theme::icon_size(ui), Sense::click());
+    response.widget_info(|| WidgetInfo::labeled(Role::Button, ui.is_enabled(), name));
+    let palette = Palette::of(ui);
+    let visuals = ui.style().interact(&response);
+    let (fill, ink) =
+        if is_main { (palette.accent, palette.on_accent) } else { (visuals.weak_bg_fill, visuals.fg_stroke.color) };
+    ui.painter().rect(rect, visuals.corner_radius, fill, visuals.bg_stroke, StrokeKind::Inside);
+    icon.paint(ui.painter(), rect, ink);
+    response.on_hover_text(name)
+}
+
+/// A heading above a group of controls.
+pub fn section(ui: &mut Ui, title: &str) {
+    ui.add_space(4.0);
+    ui.label(egui::RichText::new(title).text_style(theme::strong()));
+}
+
+/// A row of words of which one is chosen. Returns whether the choice changed.
+pub fn choose<T: PartialEq + Copy>(ui: &mut Ui, name: &str, chosen: &mut T, options: &[(T, &str, &str)]) -> bool {
+    let before = *chosen;
+    ui.horizontal_wrapped(|ui| {
+        ui.spacing_mut().item_spacing = vec2(2.0, 2.0);
+        for &(value, label, help) in options {
+            let is_chosen = *chosen == value;
+            let response = ui.add(egui::Button::selectable(is_chosen, label).frame_when_inactive(true));
+            response
+                .widget_info(|| WidgetInfo::selected(Role::RadioButton, true, is_chosen, format!("{name}: {label}")));
+            if response.on_hover_text(help).clicked() {
+                *chosen = value;
+            }
+        }
+    });
+    *chosen != before
+}
+
+/// Text with a name for assistive technology that says more than its looks do.
+pub fn spoken(ui: &mut Ui, text: egui::RichText, spoken: &str) -> Response {
+    let response = ui.label(text);
+    let id = response.id;
+    ui.ctx().accesskit_node_builder(id, |node| node.set_value(spoken));
+    response
+}

@@ -1,0 +1,8 @@
+//! What only a browser has: the worker that runs the session, and the mirror of the page for assistive
+//! technology. Nothing here draws, trains or decides.
+
+#[cfg(feature = "page")]
+mod mirror;
+#[cfg(feature = "page")]
+pub mod page;
+pub mod worker;

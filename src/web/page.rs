@@ -1,0 +1,51 @@
+//! Starts the page: the app on its canvas, with a worker behind it.
+
+use eframe::{WebOptions, WebRunner};
+use wasm_bindgen::prelude::*;
+use web_sys::HtmlCanvasElement;
+
+use super::mirror::Mirror;
+use super::worker::WorkerLink;
+use crate::ui::App;
+
+#[wasm_bindgen]
+extern "C" {
+    /// Shows a sentence in place of the page (index.html).
+    #[wasm_bindgen(js_name = failPage)]
+    fn fail_page(sentence: &str);
+}
+
+/// Starts the app; what keeps it from starting is shown as a sentence.
+pub fn start() {
+    console_error_panic_hook::set_once();
+    wasm_bindgen_futures::spawn_local(async {
+        if let Err(sentence) = run().await {
+            fail_page(&sentence);
+        }
+    });
+}
+
+async fn run() -> Result<(), String> {
+    let window = web_sys::window().ok_or("There is no window.")?;
+    let document = window.document().ok_or("There is no document.")?;
+    let element = |id: &str| document.get_element_by_id(id).ok_or(format!("The page has no element {id:?}."));
+    let canvas: HtmlCanvasElement =
+        element("canvas")?.dyn_into().map_err(|_| "The element \"canvas\" is no canvas.")?;
+    let mirror = Mirror::new(element("mirror")?);
+    WebRunner::new()
+        .start(
+            canvas,
+            WebOptions::default(),
+            Box::new(|cc| {
+                cc.egui_ctx.add_plugin(mirror);
+                let wake = cc.egui_ctx.clone();
+                let link = WorkerLink::new(move || wake.request_repaint());
+                Ok(Box::new(App::new(&cc.egui_ctx, Box::new(link))))
+            }),
+        )
+        .await
+        .map_err(|error| format!("The page could not be drawn ({error:?})."))?;
+    element("message")?.set_attribute("hidden", "").map_err(|error| format!("{error:?}"))?;
+    js_sys::Reflect::set(&window, &"pageHasStarted".into(), &true.into()).map_err(|error| format!("{error:?}"))?;
+    Ok(())
+}

@@ -1,0 +1,9 @@
+// Starts the worker's program. What goes wrong here is told to the page as a string; the program itself
+// only ever sends bytes.
+const fail = (reason) => self.postMessage("The worker could not be loaded (" + reason + ").");
+try {
+  importScripts("./worker.js");
+  wasm_bindgen({ module_or_path: "./worker_bg.wasm" }).catch(fail);
+} catch (error) {
+  fail(error);
+}
