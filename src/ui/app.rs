@@ -207,17 +207,22 @@ impl eframe::App for App {
 
     fn ui(&mut self, ui: &mut Ui, _frame: &mut eframe::Frame) {
         self.show(ui);
+    }
+}
+
+impl App {
+    /// Takes in what has been heard, draws the page, and says what has been drawn.
+    pub fn show(&mut self, ui: &mut Ui) {
+        self.hear();
+        self.draw(ui);
         let newest = self.shown.as_ref().map_or(0, |shown| shown.snapshot.number);
         if newest > self.seen {
             self.seen = newest;
             self.send(Command::Seen(newest));
         }
     }
-}
 
-impl App {
-    /// Draws the page.
-    pub fn show(&mut self, ui: &mut Ui) {
+    fn draw(&mut self, ui: &mut Ui) {
         let width = ui.available_width();
         if width < NARROW {
             theme::enlarge_targets(ui);
@@ -265,15 +270,10 @@ impl App {
     }
 
     fn show_top(&mut self, ui: &mut Ui) {
-        toolbar::show(ui, self);
+        ui.scope(|ui| toolbar::show(ui, self));
         ui.add_space(2.0);
         self.show_messages(ui);
-        let palette = Palette::of(ui);
-        ui.horizontal_wrapped(|ui| {
-            ui.spacing_mut().item_spacing.x = SPACE;
-            ui.label(RichText::new(headline::sentence(self)).text_style(theme::strong()));
-            ui.label(RichText::new(headline::progress(self)).small().color(palette.muted));
-        });
+        headline::show_sentence(ui, self);
         ui.add_space(4.0);
         theme::card(ui).show(ui, |ui| {
             ui.set_width(ui.available_width());

@@ -18,6 +18,9 @@ pub struct Shown {
     grid: Grid,
 }
 
+/// What a card adds to the height of its contents.
+const CARD: f32 = 22.0;
+
 impl Shown {
     /// Nothing when the run's grid is no good, which a session does not let happen.
     pub fn new(started: Started, snapshot: Snapshot, curve: Vec<CurvePoint>) -> Option<Shown> {
@@ -34,7 +37,7 @@ impl Shown {
         let columns = if width < NARROW { 2 } else { 3 };
         let picture = ((width - 2.0 * GAP * (columns - 1) as f32) / columns as f32).floor();
         let size = vec2(picture, picture * self.grid.rows() as f32 / self.grid.cols() as f32);
-        let plan = Plan { columns, picture: size, rest: None };
+        let plan = Plan { columns, picture: size, is_rest_right: false };
         let panels = panels::list(&self.started, &self.snapshot, view);
         let touched = self.show_panels(ui, &panels, &plan, view, pictures);
         ui.add_space(GAP);
@@ -55,19 +58,17 @@ impl Shown {
         heatmap::color_bar(ui);
         let panels = panels::list(&self.started, &self.snapshot, view);
         let area = ui.available_rect_before_wrap();
-        let plan = panels::plan(ui, area, panels.len(), &self.grid);
+        let plan = Plan::new(ui, area.size(), panels.len(), &self.grid);
         let touched = self.show_panels(ui, &panels, &plan, view, pictures);
-        let rest = plan.rest.unwrap_or_else(|| ui.available_rect_before_wrap());
-        let (mut first, second) = if rest.width() > 700.0 {
-            rest.split_left_right_at_fraction(0.5)
+        let (first, second) = if plan.is_rest_right {
+            let rest = area.with_min_x(area.left() + plan.width() + 2.0 * GAP);
+            let height = (inspector::height(self.snapshot.experts.len()) + CARD).min(rest.height() / 2.0);
+            let (above, below) = rest.split_top_bottom_at_y(rest.bottom() - height);
+            (above.with_max_y(above.bottom() - GAP), below)
         } else {
-            rest.split_top_bottom_at_fraction(0.5)
+            let (left, right) = ui.available_rect_before_wrap().split_left_right_at_fraction(0.5);
+            (left.with_max_x(left.right() - GAP), right)
         };
-        if first.right() < second.right() {
-            first.max.x -= GAP;
-        } else {
-            first.max.y -= GAP;
-        }
         let card = |ui: &mut Ui, place, contents: &dyn Fn(&mut Ui)| {
             ui.scope_builder(UiBuilder::new().max_rect(place), |ui| {
                 theme::card(ui).show(ui, |ui| {

@@ -1,7 +1,7 @@
 //! The chart: returns of ensemble and clone over training, and what PG-APE climbs.
 
-use egui::{Color32, RichText, Ui};
-use egui_plot::{Corner, Legend, Line, LineStyle, Plot, PlotPoints};
+use egui::{Color32, Label, Rangef, RichText, TextStyle, Ui};
+use egui_plot::{AxisHints, Line, LineStyle, Plot, PlotPoints, log_grid_spacer};
 
 use super::app::View;
 use super::numbers;
@@ -14,28 +14,39 @@ pub fn show(ui: &mut Ui, curve: &[CurvePoint], snapshot: &Snapshot, observer: &s
     let palette = Palette::of(ui);
     let kind = &RETURN_KINDS[view.kind];
     let unit = if kind.is_steps { "steps" } else { "probability" };
-    let title = format!("Over training: {} return ({unit})", kind.label);
-    let title = if kind.is_steps { title } else { "Over training: success".to_owned() };
-    ui.label(RichText::new(title).small().color(palette.muted));
+    let title = format!("Over training, {} ({unit}):", kind.label);
+    let j = "J = ensemble − β·clone";
+    let clone = format!("clone ({observer})");
+    ui.horizontal_wrapped(|ui| {
+        ui.spacing_mut().interact_size.y = 14.0;
+        ui.spacing_mut().item_spacing.y = 2.0;
+        ui.label(RichText::new(title).small().color(palette.muted));
+        for (name, color) in [("ensemble", palette.accent), (&clone, palette.clone), (j, palette.muted)] {
+            if name != j || kind.is_steps {
+                ui.add(Label::new(RichText::new(format!("• {name}")).small().color(color)).extend());
+            }
+        }
+    });
     let line = |name: &str, color: Color32, value: &dyn Fn(&CurvePoint) -> f64| {
         let points: Vec<[f64; 2]> = curve.iter().map(|point| [f64::from(point.update), value(point)]).collect();
         Line::new(name.to_owned(), PlotPoints::from(points)).color(color).width(2.0)
     };
     let lines = [
         Some(line("ensemble", palette.accent, &|point| (kind.get)(&point.ensemble))),
-        Some(line(&format!("clone ({observer})"), palette.clone, &|point| (kind.get)(&point.clone))),
-        // J = ensemble − β clone (Eq. 3), of this kind of return.
+        Some(line(&clone, palette.clone, &|point| (kind.get)(&point.clone))),
+        // Eq. 3, of this kind of return.
         kind.is_steps.then(|| {
-            line("J = ensemble − β·clone", palette.muted, &|point| {
-                (kind.get)(&point.ensemble) - point.beta * (kind.get)(&point.clone)
-            })
-            .style(LineStyle::dashed_loose())
+            line(j, palette.muted, &|point| (kind.get)(&point.ensemble) - point.beta * (kind.get)(&point.clone))
+                .style(LineStyle::dashed_loose())
         }),
     ];
+    let axis = |hints: AxisHints<'static>| {
+        hints.tick_label_color(palette.muted).tick_label_font(TextStyle::Small.resolve(ui.style()))
+    };
     let size = ui.available_size();
     Plot::new("curve")
         .width(size.x)
-        .height(size.y.max(120.0))
+        .height(size.y.max(70.0))
         .allow_zoom(false)
         .allow_drag(false)
         .allow_scroll(false)
@@ -45,9 +56,18 @@ pub fn show(ui: &mut Ui, curve: &[CurvePoint], snapshot: &Snapshot, observer: &s
         .include_x(f64::from(snapshot.last_update))
         .include_y(0.0)
         .include_y(if kind.is_steps { 0.0 } else { 1.0 })
-        .legend(Legend::default().position(Corner::RightBottom).background_alpha(0.8).follow_insertion_order(true))
-        .x_axis_formatter(|mark, _| if mark.value >= 0.0 { format!("{:.0}", mark.value) } else { String::new() })
-        .y_axis_formatter(|mark, _| axis_label(mark.value, kind.is_steps))
+        .grid_color(palette.line)
+        .y_grid_spacer(log_grid_spacer(5))
+        .custom_x_axes(vec![
+            axis(AxisHints::new_x())
+                .label_spacing(Rangef::new(20.0, 36.0))
+                .formatter(|mark, _| numbers::decimal(mark.value, 0)),
+        ])
+        .custom_y_axes(vec![
+            axis(AxisHints::new_y())
+                .label_spacing(Rangef::new(14.0, 24.0))
+                .formatter(|mark, _| axis_label(mark.value, kind.is_steps)),
+        ])
         .label_formatter(move |position| match position {
             egui_plot::HoverPosition::NearDataPoint { plot_name, position, .. } => {
                 Some(format!("{plot_name}\nupdate {:.0}: {}", position.x, numbers::of_kind(kind, position.y)))

@@ -32,6 +32,8 @@ pub fn show(ui: &mut Ui, app: &mut App) {
     section(ui, "Experts");
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing.x = 2.0;
+        ui.spacing_mut().button_padding.x = 8.0;
+        ui.spacing_mut().interact_size.x = 0.0;
         for n in 1..=Config::MAX_EXPERTS {
             let button = egui::Button::selectable(config.experts == n, n.to_string()).frame_when_inactive(true);
             let response = ui.add(button);
@@ -99,10 +101,7 @@ fn show_field(ui: &mut Ui, field: &Field, config: &mut Config) {
             Kind::Whole { low, high, get, set } => {
                 let mut value = get(config);
                 let speed = (f64::from(value) * 0.01).max(0.2);
-                let drag = DragValue::new(&mut value)
-                    .range(*low..=*high)
-                    .speed(speed)
-                    .update_while_editing(false);
+                let drag = DragValue::new(&mut value).range(*low..=*high).speed(speed).update_while_editing(false);
                 if ui.add(drag).accessible_name(field.label).on_hover_text(tip).changed() {
                     set(config, value);
                 }

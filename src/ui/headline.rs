@@ -1,6 +1,6 @@
 //! What there is to see, in one sentence and four figures, and the large β slider.
 
-use egui::{RichText, Slider, Ui, vec2};
+use egui::{Grid, Label, RichText, Slider, Ui, vec2};
 
 use super::app::{App, BetaMode, View};
 use super::numbers;
@@ -32,26 +32,28 @@ impl Headline {
     }
 }
 
+/// Width of the β slider where the figures stand beside it.
+const BETA_WIDTH: f32 = 330.0;
+
 /// The β slider with its mode; then the figures, beside it where there is room.
 pub fn show(ui: &mut Ui, app: &mut App) {
-    let is_narrow = ui.available_width() < theme::NARROW;
-    let show_parts = |ui: &mut Ui, app: &mut App| {
-        ui.vertical(|ui| beta(ui, app, is_narrow));
-        if !is_narrow {
-            ui.add_space(SPACE);
-        }
-        ui.vertical(|ui| figures(ui, app));
-    };
-    if is_narrow {
-        show_parts(ui, app);
+    let width = ui.available_width();
+    if width < theme::NARROW {
+        beta(ui, app, width);
+        ui.add_space(theme::GAP);
+        figures(ui, app, 2);
     } else {
-        ui.horizontal_top(|ui| show_parts(ui, app));
+        ui.horizontal_top(|ui| {
+            ui.spacing_mut().item_spacing.x = 2.0 * SPACE;
+            ui.vertical(|ui| beta(ui, app, BETA_WIDTH));
+            ui.vertical(|ui| figures(ui, app, 4));
+        });
     }
 }
 
-fn beta(ui: &mut Ui, app: &mut App, is_narrow: bool) {
+fn beta(ui: &mut Ui, app: &mut App, width: f32) {
     let palette = Palette::of(ui);
-    let width = if is_narrow { ui.available_width() } else { 330.0 };
+    ui.spacing_mut().item_spacing.x = theme::GAP;
     ui.set_width(width);
     let is_given = app.setup().ensemble.is_some();
     ui.add_enabled_ui(!is_given, |ui| {
@@ -62,7 +64,7 @@ fn beta(ui: &mut Ui, app: &mut App, is_narrow: bool) {
             ui.spacing_mut().slider_rail_height = 8.0;
             let mut beta = app.setup().config.beta;
             let slider = Slider::new(&mut beta, 0.0..=1.0)
-                .clamping(egui::SliderClamping::Edits)
+                .clamping(egui::SliderClamping::Never)
                 .step_by(0.01)
                 .fixed_decimals(2)
                 .drag_value_speed(0.01);
@@ -73,7 +75,7 @@ fn beta(ui: &mut Ui, app: &mut App, is_narrow: bool) {
                 app.set_beta(beta.clamp(0.0, Config::MAX_BETA));
             }
         });
-        ui.horizontal_wrapped(|ui| {
+        ui.horizontal(|ui| {
             let mut mode = app.view.beta_mode;
             let options = [
                 (BetaMode::Retrain, "retrain", "Every new β trains a whole run from the seed"),
@@ -87,7 +89,7 @@ fn beta(ui: &mut Ui, app: &mut App, is_narrow: bool) {
     });
 }
 
-fn figures(ui: &mut Ui, app: &mut App) {
+fn figures(ui: &mut Ui, app: &mut App, columns: usize) {
     let palette = Palette::of(ui);
     let headline = app.shown().and_then(|(started, snapshot)| Headline::of(started, snapshot, &app.view));
     let Some(headline) = headline else {
@@ -97,44 +99,66 @@ fn figures(ui: &mut Ui, app: &mut App) {
     let kind = &RETURN_KINDS[app.view.kind];
     let get = kind.get;
     let (ensemble, clone, optimal) = (get(&headline.ensemble), get(&headline.clone), get(&headline.optimal));
-    ui.horizontal_wrapped(|ui| {
-        ui.spacing_mut().item_spacing = vec2(22.0, 4.0);
-        let unit = if kind.is_steps { " steps" } else { "" };
-        for (name, color, value, help) in [
-            ("Ensemble".to_owned(), palette.accent, numbers::of_kind(kind, ensemble), "Mean of the experts' returns."),
-            (
-                format!("Clone ({})", headline.observer),
-                palette.clone,
-                numbers::of_kind(kind, clone),
-                "Return of the policy that an observer of the demonstrations ends up with: the first clone panel.",
-            ),
-            ("Optimal".to_owned(), palette.ink, numbers::of_kind(kind, optimal), "The best any policy can do."),
-            (
-                "Clone ÷ ensemble".to_owned(),
-                palette.ink,
-                if kind.is_steps { format!("{}×", numbers::decimal(clone / ensemble, 1)) } else { "–".to_owned() },
-                "How many times as many steps the clone needs.",
-            ),
-        ] {
-            ui.vertical(|ui| {
-                ui.spacing_mut().item_spacing.y = 0.0;
-                ui.label(RichText::new(&name).small().color(palette.muted));
-                let unit = if name.starts_with("Clone ÷") { "" } else { unit };
-                let words = format!("{name} {} return: {value}{unit}", kind.label);
-                spoken(ui, RichText::new(&value).text_style(theme::figure()).color(color), &words).on_hover_text(help);
-            });
+    let unit = if kind.is_steps { " steps" } else { "" };
+    let ratio = if kind.is_steps { format!("{}×", numbers::decimal(clone / ensemble, 1)) } else { "–".to_owned() };
+    let shown = [
+        ("Ensemble", palette.accent, numbers::of_kind(kind, ensemble), unit, "Mean of the experts' returns."),
+        (
+            &format!("Clone ({})", headline.observer),
+            palette.clone,
+            numbers::of_kind(kind, clone),
+            unit,
+            "Return of the policy that an observer of the demonstrations ends up with: the first clone panel.",
+        ),
+        ("Optimal", palette.ink, numbers::of_kind(kind, optimal), unit, "The best that any policy can do."),
+        ("Clone ÷ ensemble", palette.ink, ratio, "", "How many times as many steps the clone needs."),
+    ];
+    Grid::new("figures").spacing(vec2(1.5 * SPACE, 2.0)).min_col_width(70.0).show(ui, |ui| {
+        for row in shown.chunks(columns) {
+            for (name, color, value, unit, help) in row {
+                ui.vertical(|ui| {
+                    ui.spacing_mut().item_spacing.y = 0.0;
+                    ui.add(Label::new(RichText::new(*name).small().color(palette.muted)).extend());
+                    let words = format!("{name} {} return: {value}{unit}", kind.label);
+                    let text = RichText::new(value).text_style(theme::figure()).color(*color);
+                    spoken(ui, text, &words).on_hover_text(*help);
+                });
+            }
+            ui.end_row();
         }
     });
-    ui.horizontal_wrapped(|ui| {
-        ui.label(RichText::new("return:").small().color(palette.muted));
+    ui.horizontal(|ui| {
+        ui.spacing_mut().item_spacing.x = theme::GAP;
+        if columns > 2 {
+            ui.label(RichText::new("return:").small().color(palette.muted));
+        }
         let options: Vec<(usize, &str, &str)> =
             RETURN_KINDS.iter().enumerate().map(|(index, kind)| (index, kind.label, kind.help)).collect();
         choose(ui, "Return", &mut app.view.kind, &options);
     });
 }
 
-/// The sentence under the title: what a visitor sees, with its numbers.
-pub fn sentence(app: &App) -> String {
+/// The sentence under the title, and how far training is.
+pub fn show_sentence(ui: &mut Ui, app: &App) {
+    let progress = RichText::new(progress(app)).small().color(Palette::of(ui).muted);
+    let sentence = RichText::new(sentence(app)).text_style(theme::strong());
+    let parts = |ui: &mut Ui| {
+        ui.label(sentence);
+        let response = ui.label(progress);
+        ui.ctx().accesskit_node_builder(response.id, |node| node.set_role(egui::Role::Status));
+    };
+    if ui.available_width() < theme::WIDE {
+        ui.vertical(parts);
+    } else {
+        ui.horizontal(|ui| {
+            ui.spacing_mut().item_spacing.x = SPACE;
+            parts(ui);
+        });
+    }
+}
+
+/// What a visitor sees, with its numbers.
+fn sentence(app: &App) -> String {
     let Some((started, snapshot)) = app.shown() else { return String::new() };
     let Some(headline) = Headline::of(started, snapshot, &app.view) else { return String::new() };
     let n = snapshot.experts.len();
@@ -150,7 +174,7 @@ pub fn sentence(app: &App) -> String {
 }
 
 /// How far training is, in words.
-pub fn progress(app: &App) -> String {
+fn progress(app: &App) -> String {
     let Some((_, snapshot)) = app.shown() else { return "starting".to_owned() };
     let of = format!("update {} of {}", snapshot.update, snapshot.last_update);
     match snapshot.state {

@@ -117,7 +117,7 @@ impl Heatmap<'_> {
 fn arrows(cell: Rect, policy: &[f32; 5], ink: Color32) -> Vec<Shape> {
     let size = cell.width().min(cell.height());
     let center = cell.center();
-    let width = (size * 0.07).max(1.0);
+    let width = (size * 0.06).max(1.0);
     let mut shapes = Vec::new();
     for (action, &p) in Action::ALL.into_iter().zip(policy) {
         // What is rarer than one time in thirty would be a speck.
@@ -131,11 +131,11 @@ fn arrows(cell: Rect, policy: &[f32; 5], ink: Color32) -> Vec<Shape> {
         let (down, right) = action.direction();
         let along = vec2(right as f32, down as f32);
         let across = along.rot90();
-        let head = (size * 0.15).min(size * 0.46 * p);
+        let head = size * 0.16 * p.sqrt().min(2.0 * p);
         let tip = center + along * size * 0.46 * p;
         let neck = tip - along * head;
         shapes.push(Shape::line_segment([center, neck], Stroke::new(width, ink)));
-        let wing = across * head * 0.75;
+        let wing = across * head * 0.7;
         shapes.push(Shape::convex_polygon(vec![tip, neck + wing, neck - wing], ink, Stroke::NONE));
     }
     shapes
@@ -159,7 +159,7 @@ pub fn color_bar(ui: &mut Ui) {
     };
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = 6.0;
-        text(ui, "Return from each cell, capped:");
+        text(ui, "Return from a cell, capped:");
         text(ui, "−100");
         let (rect, _) = ui.allocate_exact_size(vec2(110.0, 10.0), Sense::hover());
         let mut mesh = Mesh::default();

@@ -1,6 +1,6 @@
 //! What this page is, in a few paragraphs.
 
-use egui::{Modal, RichText, Ui};
+use egui::{Frame, Modal, RichText, Ui};
 
 use super::theme::{self, Palette};
 
@@ -14,12 +14,13 @@ const PARAGRAPHS: [(&str, &str); 5] = [
     (
         "What the clone is",
         "An observer sees cells and actions, not which expert acted, and learns at each cell a mixture of the \
-         experts, each weighed by p(c|s). That guess is the observer; choose it on the left.",
+         experts, each weighed by p(c|s). That guess is the observer.",
     ),
     (
         "What you see",
         "Colour is the expected number of steps from a cell to the flag, cut at 100; arrows are the probability of each \
-         move, a dot that of staying. All numbers are exact: nothing on the page is sampled but the training itself.",
+         move, a dot that of staying. All figures are exact. Only training \
+         plays episodes, and an observer who has to watch some.",
     ),
     (
         "What to try",
@@ -36,7 +37,8 @@ const PARAGRAPHS: [(&str, &str); 5] = [
 
 /// Shows the window; returns whether it was closed.
 pub fn show(ui: &mut Ui) -> bool {
-    let response = Modal::new(egui::Id::unique("help")).show(ui.ctx(), |ui| {
+    let frame = Frame::popup(ui.style()).inner_margin(20);
+    let response = Modal::new(egui::Id::unique("help")).frame(frame).show(ui.ctx(), |ui| {
         ui.set_max_width(520.0_f32.min(ui.ctx().content_rect().width() - 48.0));
         ui.label(RichText::new("ape-lab").heading());
         ui.label(

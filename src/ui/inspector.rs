@@ -1,11 +1,19 @@
-//! One cell in every panel: hitting time, π(·|s) and p(c|s) as numbers.
+//! One cell in every panel: hitting time, π(·|s) and p(c|s) as numbers. A column a panel.
 
 use egui::{Grid as Table, RichText, ScrollArea, Ui};
 
 use super::numbers;
 use super::panels::Panel;
 use super::theme::{self, Palette};
-use crate::mdp::Grid;
+use crate::mdp::{Action, Grid};
+
+/// Height that the table needs for so many experts.
+pub fn height(experts: usize) -> f32 {
+    // The title, the heads, h(s), five actions and p(c|s).
+    24.0 + ROW * (7 + experts) as f32
+}
+
+const ROW: f32 = 19.0;
 
 /// The table of a cell; a hint while none has been pointed at.
 pub fn show(ui: &mut Ui, panels: &[Panel], grid: &Grid, cell: Option<usize>) {
@@ -26,27 +34,40 @@ pub fn show(ui: &mut Ui, panels: &[Panel], grid: &Grid, cell: Option<usize>) {
         ui.label(quiet("No policy acts here."));
         return;
     }
-    ScrollArea::both().auto_shrink([false, true]).show(ui, |ui| {
-        Table::new("inspector").striped(false).spacing([10.0, 3.0]).min_col_width(0.0).show(ui, |ui| {
+    ui.spacing_mut().interact_size.y = ROW - 3.0;
+    let experts = panels.iter().filter(|panel| panel.clone.is_none()).count();
+    ScrollArea::both().auto_shrink([false, true]).min_scrolled_height(height(experts)).show(ui, |ui| {
+        Table::new("inspector").striped(false).spacing([8.0, 3.0]).min_col_width(0.0).show(ui, |ui| {
+            let panels: Vec<_> = panels.iter().filter_map(|panel| Some((panel, panel.policy?))).collect();
             ui.label("");
-            ui.label(quiet("steps h(s)"));
-            for sign in ["Up", "Down", "Left", "Right", "Stay"] {
-                ui.label(quiet(sign));
+            for (panel, _) in &panels {
+                ui.label(RichText::new(&panel.short).small().strong());
             }
-            ui.label(quiet("p(c|s)"));
             ui.end_row();
-            for (panel, policy) in panels.iter().filter_map(|panel| Some((panel, panel.policy?))) {
-                ui.label(RichText::new(&panel.title).small());
+            ui.label(quiet("steps"));
+            for (_, policy) in &panels {
                 ui.label(RichText::new(numbers::steps(f64::from(policy.hitting_time[state]))).small());
-                for &p in &policy.policy[state] {
-                    let text = RichText::new(numbers::decimal(f64::from(p), 2)).small();
-                    ui.label(if p < 0.005 { text.color(palette.muted) } else { text });
+            }
+            ui.end_row();
+            let probability = |ui: &mut Ui, p: f32| {
+                let text = RichText::new(numbers::decimal(f64::from(p), 2)).small();
+                ui.label(if p < 0.005 { text.color(palette.muted) } else { text });
+            };
+            for action in Action::ALL {
+                ui.label(quiet(action.name()));
+                for (_, policy) in &panels {
+                    probability(ui, policy.policy[state][action as usize]);
                 }
-                if let Some((_, contexts)) = panel.clone {
-                    let experts = contexts.len() / grid.cells();
-                    let shares = &contexts[state * experts..][..experts];
-                    let text: Vec<String> = shares.iter().map(|&p| numbers::decimal(f64::from(p), 2)).collect();
-                    ui.label(RichText::new(text.join("  ")).small());
+                ui.end_row();
+            }
+            let experts = panels.iter().filter_map(|(panel, _)| panel.clone).map(|(_, p)| p.len() / grid.cells()).max();
+            for expert in 0..experts.unwrap_or(0) {
+                ui.label(quiet(&format!("p({}|s)", expert + 1)));
+                for (panel, _) in &panels {
+                    match panel.clone {
+                        Some((_, p)) => probability(ui, p[state * p.len() / grid.cells() + expert]),
+                        None => _ = ui.label(""),
+                    }
                 }
                 ui.end_row();
             }

@@ -14,6 +14,8 @@ use crate::mdp::{Grid, RETURN_KINDS};
 /// A panel: what it shows and what it is called.
 pub struct Panel<'a> {
     pub title: String,
+    /// The same in a column's head.
+    pub short: String,
     /// Nothing while the session has not evaluated it yet.
     pub policy: Option<&'a PolicyView>,
     /// For a clone its place in [`View::clones`], and p(c|s).
@@ -24,6 +26,7 @@ pub struct Panel<'a> {
 pub fn list<'a>(started: &'a Started, snapshot: &'a Snapshot, view: &View) -> Vec<Panel<'a>> {
     let experts = snapshot.experts.iter().enumerate().map(|(index, policy)| Panel {
         title: if snapshot.experts.len() == 1 { "Expert".to_owned() } else { format!("Expert {}", index + 1) },
+        short: format!("E{}", index + 1),
         policy: Some(policy),
         clone: None,
     });
@@ -31,9 +34,15 @@ pub fn list<'a>(started: &'a Started, snapshot: &'a Snapshot, view: &View) -> Ve
         let clone = snapshot.clones.iter().find(|clone| clone.observer == *observer);
         let contexts = clone.map_or(&[][..], |clone| &clone.contexts);
         let title = format!("Clone ({observer})");
-        Panel { title, policy: clone.map(|clone| &clone.view), clone: Some((index, contexts)) }
+        Panel {
+            title,
+            short: observer.to_string(),
+            policy: clone.map(|clone| &clone.view),
+            clone: Some((index, contexts)),
+        }
     });
-    let optimal = Panel { title: "Optimal".to_owned(), policy: Some(&started.optimal), clone: None };
+    let optimal =
+        Panel { title: "Optimal".to_owned(), short: "optimal".to_owned(), policy: Some(&started.optimal), clone: None };
     experts.chain(clones).chain(std::iter::once(optimal)).collect()
 }
 
@@ -51,50 +60,45 @@ fn title_height(ui: &Ui) -> f32 {
     ui.spacing().interact_size.y + 20.0
 }
 
-/// How panels are laid out in a given area: columns, size of a picture, and what is left for the rest of
-/// the page: beside the last row or below.
+/// How panels are laid out in a given area.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Plan {
     pub columns: usize,
+    /// Size of a picture.
     pub picture: Vec2,
-    /// Space for chart and inspector, in place of panels in the last row; below everything when `None`.
-    pub rest: Option<Rect>,
+    /// Whether chart and inspector stand at the right of the panels, or below them.
+    pub is_rest_right: bool,
 }
 
-/// Least size of chart and inspector together: beside the panels, and in a strip below them.
-const REST_BESIDE: Vec2 = vec2(330.0, 300.0);
+/// Least width of chart and inspector at the right, and least height below.
+const REST_RIGHT: f32 = 340.0;
 const REST_BELOW: f32 = 210.0;
 
-/// The plan with the largest pictures.
-pub fn plan(ui: &Ui, area: Rect, panels: usize, grid: &Grid) -> Plan {
-    let title = title_height(ui);
-    let aspect = grid.cols() as f32 / grid.rows() as f32;
-    let fit = |columns: usize, rows: usize, height: f32| -> Vec2 {
-        let width = (area.width() - GAP * 2.0 * (columns - 1) as f32) / columns as f32;
-        let height = (height - GAP * (rows - 1) as f32) / rows as f32 - title;
-        let width = width.min(height * aspect).floor().max(40.0);
-        vec2(width, width / aspect)
-    };
-    let mut best = Plan { columns: 1, picture: Vec2::ZERO, rest: None };
-    for columns in 1..=panels {
-        let rows = panels.div_ceil(columns);
-        let below = fit(columns, rows, area.height() - REST_BELOW - GAP);
-        if below.x > best.picture.x {
-            best = Plan { columns, picture: below, rest: None };
-        }
-        let in_last_row = panels - (rows - 1) * columns;
-        if in_last_row < columns {
-            let picture = fit(columns, rows, area.height());
-            let left = area.left() + in_last_row as f32 * (picture.x + 2.0 * GAP);
-            let top = area.top() + (rows - 1) as f32 * (picture.y + title + GAP);
-            let rest = Rect::from_min_max(egui::pos2(left, top), area.max);
-            let is_enough = rest.width() >= REST_BESIDE.x && rest.height() >= REST_BESIDE.y;
-            if is_enough && picture.x > best.picture.x {
-                best = Plan { columns, picture, rest: Some(rest) };
-            }
-        }
+impl Plan {
+    /// The plan with the largest pictures.
+    pub fn new(ui: &Ui, area: Vec2, panels: usize, grid: &Grid) -> Plan {
+        let title = title_height(ui);
+        let aspect = grid.cols() as f32 / grid.rows() as f32;
+        let plans =
+            (1..=panels).flat_map(|columns| [(columns, true), (columns, false)]).map(|(columns, is_rest_right)| {
+                let rows = panels.div_ceil(columns);
+                let space = if is_rest_right {
+                    area - vec2(REST_RIGHT + 2.0 * GAP, 0.0)
+                } else {
+                    area - vec2(0.0, REST_BELOW + GAP)
+                };
+                let width = (space.x - GAP * 2.0 * (columns - 1) as f32) / columns as f32;
+                let height = (space.y - GAP * (rows - 1) as f32) / rows as f32 - title;
+                let width = width.min(height * aspect).floor().max(40.0);
+                Plan { columns, picture: vec2(width, width / aspect), is_rest_right }
+            });
+        plans.reduce(|best, plan| if plan.picture.x > best.picture.x { plan } else { best }).expect("a page has panels")
     }
-    best
+
+    /// Width of all columns.
+    pub fn width(&self) -> f32 {
+        self.columns as f32 * (self.picture.x + 2.0 * GAP) - 2.0 * GAP
+    }
 }
 
 /// Draws all panels by a plan, from the top left of what is free in `ui`.
@@ -115,20 +119,19 @@ pub fn show(
         for (column, panel) in row.iter().enumerate() {
             let left = line.left() + column as f32 * (size.x + 2.0 * GAP);
             let place = Rect::from_min_size(egui::pos2(left, line.top()), size);
-            ui.scope_builder(UiBuilder::new().max_rect(place), |ui| {
-                ui.set_clip_rect(place.expand(6.0).intersect(ui.clip_rect()));
-                show_title(ui, panel, title, view, &mut touched);
-                let picture = Rect::from_min_size(place.min + vec2(0.0, title), plan.picture);
-                let Some(policy) = panel.policy else {
-                    ui.painter().rect_filled(picture, 4.0, Palette::of(ui).raised);
-                    return;
-                };
-                let id = egui::Id::unique(("heatmap", &panel.title));
-                let name = describe(&panel.title, policy);
-                let heatmap = Heatmap { id, name: &name, grid, policy, version, marked: view.cell };
-                let cell = heatmap.show(ui, picture, pictures);
-                touched.cell = touched.cell.or(cell);
-            });
+            // A child that takes no room of its own: the line above has been taken already.
+            let ui = &mut ui.new_child(UiBuilder::new().max_rect(place).id_salt(&panel.title));
+            show_title(ui, panel, title, view, &mut touched);
+            let picture = Rect::from_min_size(place.min + vec2(0.0, title), plan.picture);
+            let Some(policy) = panel.policy else {
+                ui.painter().rect_filled(picture, 4.0, Palette::of(ui).raised);
+                continue;
+            };
+            let id = egui::Id::unique(("heatmap", &panel.title));
+            let name = describe(&panel.title, policy);
+            let heatmap = Heatmap { id, name: &name, grid, policy, version, marked: view.cell };
+            let cell = heatmap.show(ui, picture, pictures);
+            touched.cell = touched.cell.or(cell);
         }
     }
     touched
@@ -153,8 +156,11 @@ fn show_title(ui: &mut Ui, panel: &Panel, height: f32, view: &View, touched: &mu
             ui.label(RichText::new(&panel.title).text_style(theme::strong()));
         }
         Some((index, _)) => {
-            ui.label(RichText::new("Clone").text_style(theme::strong()).color(palette.clone));
             let button = if view.clones.len() == 1 { Some(Icon::Add) } else { (index > 0).then_some(Icon::Remove) };
+            // Where there is no room for the word, the box's colour has to do.
+            if line.x - button.map_or(0.0, |_| height - 16.0) >= 150.0 {
+                ui.label(RichText::new("Clone").text_style(theme::strong()).color(palette.clone));
+            }
             let side = ui.spacing().interact_size.y;
             let width = ui.available_width() - button.map_or(0.0, |_| side + 4.0);
             choose_observer(ui, index, width, view, touched);
@@ -177,7 +183,7 @@ fn show_title(ui: &mut Ui, panel: &Panel, height: f32, view: &View, touched: &mu
         None => "evaluating …".to_owned(),
         Some(returns) => {
             let value = numbers::of_kind(kind, (kind.get)(returns));
-            let arrive = format!("{} arrive in time", numbers::percent(returns.success));
+            let arrive = format!("{} arrive", numbers::percent(returns.success));
             if kind.is_steps { format!("{value} steps, {arrive}") } else { arrive }
         }
     };
@@ -196,7 +202,7 @@ fn choose_observer(ui: &mut Ui, index: usize, width: f32, view: &View, touched: 
     let response = ComboBox::from_id_salt(("clone", index))
         .width(width.max(60.0))
         .truncate()
-        .selected_text(chosen.to_string())
+        .selected_text(RichText::new(chosen.to_string()).color(Palette::of(ui).clone))
         .show_ui(ui, |ui| {
             for choice in choices {
                 let text = format!("{choice}: {}", choice.model().title);
@@ -216,18 +222,18 @@ mod tests {
     use super::*;
     use crate::mdp::GridSpec;
 
-    /// On the screens people have, pictures are as large as this, and everything has its place.
+    /// On the screens people have, pictures are as large as this.
     #[test]
     fn five_panels_fill_the_page() {
         let grid = Grid::new(GridSpec::default()).unwrap();
         egui::__run_test_ui(|ui| {
-            let at = |width, height| Rect::from_min_size(egui::Pos2::ZERO, vec2(width, height));
-            let laptop = plan(ui, at(1000.0, 640.0), 5, &grid);
-            assert!(laptop.columns == 3 && laptop.rest.is_some() && laptop.picture.x > 250.0, "{laptop:?}");
-            let rest = laptop.rest.unwrap();
-            assert!(at(1000.0, 640.0).contains_rect(rest) && rest.left() > 2.0 * laptop.picture.x);
-            let four_k = plan(ui, at(3500.0, 1900.0), 5, &grid);
-            assert!(four_k.picture.x > 600.0, "{four_k:?}");
+            for (area, least) in
+                [(vec2(980.0, 560.0), 195.0), (vec2(1620.0, 840.0), 300.0), (vec2(3500.0, 1900.0), 800.0)]
+            {
+                let plan = Plan::new(ui, area, 5, &grid);
+                assert!(plan.picture.x >= least, "{plan:?}");
+                assert!(plan.width() + if plan.is_rest_right { REST_RIGHT } else { 0.0 } <= area.x, "{plan:?}");
+            }
         });
     }
 }

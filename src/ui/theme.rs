@@ -14,6 +14,8 @@ pub struct Palette {
     /// Rails, unselected buttons.
     pub raised: Color32,
     pub line: Color32,
+    /// Edges of what can be pressed.
+    pub edge: Color32,
     pub ink: Color32,
     pub muted: Color32,
     /// What can be acted on, and the ensemble.
@@ -30,6 +32,7 @@ const LIGHT: Palette = Palette {
     card: Color32::from_rgb(0xff, 0xff, 0xff),
     raised: Color32::from_rgb(0xe9, 0xea, 0xe6),
     line: Color32::from_rgb(0xdd, 0xde, 0xd9),
+    edge: Color32::from_rgb(0xb4, 0xb9, 0xb3),
     ink: Color32::from_rgb(0x1f, 0x23, 0x28),
     muted: Color32::from_rgb(0x5a, 0x61, 0x6c),
     accent: Color32::from_rgb(0x0b, 0x74, 0x70),
@@ -44,6 +47,7 @@ const DARK: Palette = Palette {
     card: Color32::from_rgb(0x1c, 0x1f, 0x25),
     raised: Color32::from_rgb(0x2a, 0x2e, 0x36),
     line: Color32::from_rgb(0x33, 0x38, 0x41),
+    edge: Color32::from_rgb(0x55, 0x5c, 0x68),
     ink: Color32::from_rgb(0xe8, 0xea, 0xee),
     muted: Color32::from_rgb(0xa2, 0xa9, 0xb5),
     accent: Color32::from_rgb(0x45, 0xc4, 0xb4),
@@ -176,7 +180,7 @@ fn visuals(theme: Theme) -> Visuals {
     let widgets = &mut visuals.widgets;
     for (state, fill, stroke, ink) in [
         (&mut widgets.noninteractive, palette.card, palette.line, palette.ink),
-        (&mut widgets.inactive, palette.raised, Color32::TRANSPARENT, palette.ink),
+        (&mut widgets.inactive, palette.raised, palette.edge, palette.ink),
         (&mut widgets.hovered, palette.raised, palette.accent, palette.ink),
         (&mut widgets.active, palette.raised, palette.accent, palette.ink),
         (&mut widgets.open, palette.raised, palette.accent, palette.ink),
@@ -205,5 +209,5 @@ pub fn card(ui: &Ui) -> egui::Frame {
 
 /// Size of a square button with an icon.
 pub fn icon_size(ui: &Ui) -> Vec2 {
-    Vec2::splat(ui.spacing().interact_size.y.max(32.0))
+    Vec2::splat(ui.spacing().interact_size.y)
 }

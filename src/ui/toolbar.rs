@@ -1,6 +1,6 @@
 //! The bar on top: presets, play, step, reset, speed, theme, help.
 
-use egui::{ComboBox, RichText, Slider, ThemePreference, Ui};
+use egui::{Align, ComboBox, Layout, RichText, Slider, ThemePreference, Ui};
 
 use super::app::App;
 use super::theme::{self, Palette};
@@ -13,19 +13,33 @@ pub const SPEEDS: [Option<f32>; 9] =
     [Some(1.0), Some(5.0), Some(20.0), Some(60.0), Some(150.0), Some(300.0), Some(600.0), Some(1500.0), None];
 
 pub fn show(ui: &mut Ui, app: &mut App) {
-    let is_narrow = ui.available_width() < theme::NARROW;
-    ui.horizontal_wrapped(|ui| {
-        ui.label(RichText::new("ape-lab").heading());
-        presets(ui, app);
-        transport(ui, app);
-        if !is_narrow {
+    if ui.available_width() < theme::NARROW {
+        ui.horizontal(|ui| {
+            ui.label(RichText::new("ape-lab").heading());
+            at_the_right(ui, app);
+        });
+        ui.horizontal(|ui| {
+            presets(ui, app);
+            transport(ui, app);
+        });
+    } else {
+        ui.spacing_mut().interact_size.y = 34.0;
+        ui.horizontal(|ui| {
+            ui.label(RichText::new("ape-lab").heading());
+            presets(ui, app);
+            transport(ui, app);
             speed(ui, app);
-            ui.add_space((ui.available_width() - 2.0 * (theme::icon_size(ui).x + 8.0)).max(0.0));
-        }
-        theme_button(ui);
+            at_the_right(ui, app);
+        });
+    }
+}
+
+fn at_the_right(ui: &mut Ui, app: &mut App) {
+    ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
         if icon_button(ui, Icon::Help, "What is this?", false).clicked() {
             app.view.is_help_open = !app.view.is_help_open;
         }
+        theme_button(ui);
     });
 }
 

@@ -116,8 +116,9 @@ pub fn section(ui: &mut Ui, title: &str) {
 /// A row of words of which one is chosen. Returns whether the choice changed.
 pub fn choose<T: PartialEq + Copy>(ui: &mut Ui, name: &str, chosen: &mut T, options: &[(T, &str, &str)]) -> bool {
     let before = *chosen;
-    ui.horizontal_wrapped(|ui| {
-        ui.spacing_mut().item_spacing = vec2(2.0, 2.0);
+    ui.horizontal(|ui| {
+        ui.spacing_mut().item_spacing.x = 2.0;
+        ui.spacing_mut().button_padding.x = 9.0;
         for &(value, label, help) in options {
             let is_chosen = *chosen == value;
             let response = ui.add(egui::Button::selectable(is_chosen, label).frame_when_inactive(true));
@@ -131,9 +132,9 @@ pub fn choose<T: PartialEq + Copy>(ui: &mut Ui, name: &str, chosen: &mut T, opti
     *chosen != before
 }
 
-/// Text with a name for assistive technology that says more than its looks do.
+/// A label whose words for assistive technology say more than its looks do.
 pub fn spoken(ui: &mut Ui, text: egui::RichText, spoken: &str) -> Response {
-    let response = ui.label(text);
+    let response = ui.add(egui::Label::new(text).extend());
     let id = response.id;
     ui.ctx().accesskit_node_builder(id, |node| node.set_value(spoken));
     response

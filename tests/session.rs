@@ -1,0 +1,295 @@
+#![cfg(not(target_arch = "wasm32"))]
+//! The session as a page meets it: commands in, events out, at a pace. Time is a number that the test sets.
+
+use std::cell::Cell;
+
+use ape_lab::ape::observer::ObserverChoice;
+use ape_lab::ape::{Config, Trainer};
+use ape_lab::experiment::{Preset, Setup};
+use ape_lab::lab::{
+    Command, Event, Link, PROTOCOL, Pace, RunState, Session, Snapshot, Started, ThreadLink, decode, encode,
+};
+use ape_lab::mdp::{Grid, GridSpec};
+
+/// A session with a clock that goes on by a step at every look at it.
+struct Desk {
+    session: Session,
+    now: Cell<f64>,
+    tick: f64,
+    snapshots: Vec<Snapshot>,
+    started: Vec<Started>,
+    refused: Vec<String>,
+    /// Whether snapshots are answered.
+    is_drawing: bool,
+}
+
+impl Desk {
+    fn new() -> Desk {
+        Desk {
+            session: Session::new(),
+            now: Cell::new(0.0),
+            tick: 0.5,
+            snapshots: Vec::new(),
+            started: Vec::new(),
+            refused: Vec::new(),
+            is_drawing: true,
+        }
+    }
+
+    fn send(&mut self, command: Command) {
+        // Through bytes, as in the browser.
+        let command: Command = decode(&encode(&command)).unwrap();
+        self.session.handle(command);
+        self.hear();
+    }
+
+    fn hear(&mut self) {
+        for event in self.session.events() {
+            match decode(&encode(&event)).unwrap() {
+                Event::Ready { .. } => unreachable!("drivers say so, not sessions"),
+                Event::Started(started) => self.started.push(*started),
+                Event::Refused(sentence) => self.refused.push(sentence),
+                Event::Snapshot(snapshot) => {
+                    if self.is_drawing {
+                        self.session.handle(Command::Seen(snapshot.number));
+                    }
+                    self.snapshots.push(*snapshot);
+                }
+            }
+        }
+    }
+
+    fn advance(&mut self) -> Pace {
+        let pace = self.session.advance(&|| {
+            self.now.set(self.now.get() + self.tick);
+            self.now.get()
+        });
+        self.hear();
+        pace
+    }
+
+    /// Lets the session work as a driver does, until it waits for a command or `milliseconds` have gone by.
+    fn run(&mut self, milliseconds: f64) {
+        let end = self.now.get() + milliseconds;
+        while self.now.get() < end {
+            match self.advance() {
+                Pace::Now => {}
+                Pace::After(wait) => self.now.set(self.now.get() + wait),
+                Pace::Idle => return,
+            }
+        }
+    }
+
+    fn load(&mut self, config: Config, play: bool) {
+        self.send(Command::Load { setup: Box::new(Setup { config, ..Setup::default() }), play });
+    }
+
+    fn last(&self) -> &Snapshot {
+        self.snapshots.last().expect("there has been a snapshot")
+    }
+}
+
+/// 20 updates of 100 steps.
+fn short() -> Config {
+    Config { batch_steps: 100, total_steps: 2000, ..Config::default() }
+}
+
+fn digest_after(config: Config, updates: u32) -> u64 {
+    let mut trainer = Trainer::new(Grid::new(GridSpec::default()).unwrap(), config).unwrap();
+    (0..updates).for_each(|_| trainer.update());
+    trainer.digest()
+}
+
+#[test]
+fn a_run_plays_to_its_end_and_shows_what_the_trainer_makes() {
+    let mut desk = Desk::new();
+    desk.load(short(), true);
+    desk.run(1e6);
+    let last = desk.last();
+    assert_eq!((last.state, last.update, last.last_update), (RunState::Finished, 20, 20));
+    assert_eq!(last.digest, digest_after(short(), 20));
+    assert!(last.training_ms > 0.0);
+    assert_eq!((last.experts.len(), last.clones[0].observer), (2, ObserverChoice::UNIFORM));
+    let curve: Vec<u32> = desk.snapshots.iter().flat_map(|s| s.curve.iter().map(|point| point.update)).collect();
+    assert_eq!(curve, (0..=20).collect::<Vec<_>>());
+    assert_eq!(desk.started.len(), 1);
+    assert!((desk.started[0].optimal.returns.capped_return + 9.0).abs() < 1e-6);
+}
+
+#[test]
+fn play_pause_step_and_reset() {
+    let mut desk = Desk::new();
+    desk.load(short(), false);
+    desk.run(1e3);
+    assert_eq!((desk.last().state, desk.last().update), (RunState::Paused, 0));
+    for update in 1..=3 {
+        desk.send(Command::Step);
+        desk.run(1e3);
+        assert_eq!((desk.last().state, desk.last().update), (RunState::Paused, update));
+    }
+    assert_eq!(desk.last().digest, digest_after(short(), 3));
+    desk.send(Command::Play);
+    desk.advance();
+    desk.send(Command::Pause);
+    desk.run(1e3);
+    let paused_at = desk.last().update;
+    assert_eq!(desk.last().state, RunState::Paused);
+    desk.run(1e3);
+    assert_eq!(desk.last().update, paused_at);
+    desk.send(Command::Reset);
+    desk.run(1e3);
+    assert_eq!(
+        (desk.last().state, desk.last().update, desk.last().digest),
+        (RunState::Paused, 0, digest_after(short(), 0))
+    );
+    // Played to the end, it plays on for as long again.
+    for end in [20, 40] {
+        desk.send(Command::Play);
+        desk.run(1e6);
+        assert_eq!((desk.last().state, desk.last().update), (RunState::Finished, end));
+    }
+}
+
+#[test]
+fn speed_is_kept() {
+    let mut desk = Desk::new();
+    desk.load(Config { total_steps: 100_000, ..short() }, false);
+    desk.send(Command::Speed(Some(50.0)));
+    desk.run(1e3);
+    desk.tick = 0.01;
+    desk.send(Command::Play);
+    desk.run(2000.0);
+    assert!((95..=115).contains(&desk.last().update), "{}", desk.last().update);
+    desk.send(Command::Speed(None));
+    desk.run(1000.0);
+    assert_eq!(desk.last().state, RunState::Finished);
+}
+
+#[test]
+fn snapshots_come_sixty_a_second_and_never_more_than_two_unanswered() {
+    let mut desk = Desk::new();
+    desk.tick = 0.05;
+    desk.load(Config { total_steps: 10_000_000, ..short() }, true);
+    desk.run(500.0);
+    let rate = f64::from(desk.snapshots.len() as u32) / 0.5;
+    assert!((20.0..=62.0).contains(&rate), "{rate}");
+    // The page stops drawing: two snapshots are on their way, then training waits too.
+    desk.is_drawing = false;
+    let before = desk.snapshots.len();
+    desk.run(2000.0);
+    assert_eq!(desk.snapshots.len(), before + 2);
+    let waiting = desk.advance();
+    assert_eq!(waiting, Pace::Idle);
+    // It draws again: training goes on.
+    desk.is_drawing = true;
+    let update = desk.last().update;
+    desk.send(Command::Seen(desk.last().number));
+    desk.run(100.0);
+    assert!(desk.last().update > update);
+}
+
+#[test]
+fn a_changed_beta_goes_on_or_trains_anew() {
+    let mut desk = Desk::new();
+    desk.load(short(), true);
+    desk.run(1e6);
+    desk.send(Command::Continue { beta: 0.1 });
+    desk.run(1e6);
+    assert_eq!((desk.last().update, desk.last().beta, desk.started.len()), (40, 0.1, 1));
+    // Retraining shows nothing before its end, and only the newest of many β is trained.
+    let before = desk.snapshots.len();
+    for beta in [0.2, 0.3, 0.4] {
+        desk.send(Command::Retrain { beta });
+    }
+    desk.run(1e6);
+    let after = &desk.snapshots[before..];
+    let shown: Vec<_> = after.iter().map(|s| (s.beta, s.update, s.state)).collect();
+    assert_eq!(shown, [(0.2, 20, RunState::Finished), (0.4, 20, RunState::Finished)]);
+    assert_eq!(desk.last().digest, digest_after(Config { beta: 0.4, ..short() }, 20));
+    // The whole curve comes with it.
+    assert_eq!(desk.last().curve.len(), 21);
+}
+
+#[test]
+fn what_cannot_be_done_is_refused_and_changes_nothing() {
+    let mut desk = Desk::new();
+    for command in [Command::Play, Command::Step, Command::Reset, Command::Retrain { beta: 0.5 }] {
+        desk.send(command);
+    }
+    assert_eq!(desk.refused, vec!["Nothing has been loaded yet."; 4]);
+    desk.load(short(), true);
+    desk.run(1e6);
+    let good = desk.last().clone();
+    desk.load(Config { beta: 7.0, ..short() }, true);
+    desk.send(Command::Continue { beta: f64::NAN });
+    desk.send(Command::Retrain { beta: -1.0 });
+    let grid = GridSpec { walls: vec![(0, 0)], ..GridSpec::default() };
+    desk.send(Command::Load { setup: Box::new(Setup { grid, ..Setup::default() }), play: true });
+    desk.run(1e6);
+    let refused: Vec<&str> = desk.refused[4..].iter().map(String::as_str).collect();
+    assert_eq!(
+        refused,
+        [
+            "beta 7: must be a number from 0 to 2",
+            "beta NaN: must be a number from 0 to 2",
+            "beta -1: must be a number from 0 to 2",
+            "goal (row 0, column 0) is a wall"
+        ]
+    );
+    assert_eq!((desk.last().run, desk.last().digest), (good.run, good.digest));
+    assert!(decode::<Command>(&[250, 1, 2]).unwrap_err().contains("could not be read"));
+}
+
+#[test]
+fn a_given_ensemble_is_shown_and_not_trained() {
+    let mut desk = Desk::new();
+    desk.send(Command::Show(ObserverChoice::all().collect()));
+    desk.send(Command::Load { setup: Box::new((Preset::find("trap").unwrap().setup)()), play: true });
+    desk.run(1e3);
+    assert_eq!(desk.last().state, RunState::Given);
+    let names: Vec<String> = desk.last().clones.iter().map(|clone| clone.observer.to_string()).collect();
+    assert_eq!(names, ["occupancy", "uniform", "replay(60)"]);
+    assert!((desk.last().clones[0].view.returns.capped_return + 90.45).abs() < 0.005);
+    desk.send(Command::Play);
+    assert_eq!(desk.refused, ["This ensemble was given: there is nothing to train."]);
+}
+
+/// The replay observer of a finished ensemble watches fresh demonstrations: close to `occupancy`.
+#[test]
+fn clones_that_are_asked_for_are_evaluated() {
+    let mut desk = Desk::new();
+    desk.load(Config { total_steps: 400_000, ..Config::default() }, true);
+    desk.run(1e6);
+    assert_eq!(desk.last().clones.len(), 1);
+    desk.send(Command::Show(vec![ObserverChoice::OCCUPANCY, ObserverChoice::PAPER]));
+    desk.run(1e3);
+    let returns: Vec<f64> = desk.last().clones.iter().map(|clone| clone.view.returns.horizon_return).collect();
+    assert_eq!(returns.len(), 3);
+    assert!((returns[1] - returns[2]).abs() < 3.0, "{returns:?}");
+}
+
+/// The thread behind the native window: ready, a whole run, and a new thread when asked for.
+#[test]
+fn a_thread_runs_a_session() {
+    let mut link = ThreadLink::new(|| ());
+    let wait = |link: &mut ThreadLink| loop {
+        match link.receive() {
+            Some(event) => return event.unwrap(),
+            None => std::thread::sleep(std::time::Duration::from_millis(1)),
+        }
+    };
+    for _ in 0..2 {
+        assert_eq!(wait(&mut link), Event::Ready { protocol: PROTOCOL });
+        link.send(&Command::Load { setup: Box::new(Setup { config: short(), ..Setup::default() }), play: true });
+        let last = loop {
+            if let Event::Snapshot(snapshot) = wait(&mut link) {
+                link.send(&Command::Seen(snapshot.number));
+                if snapshot.state == RunState::Finished {
+                    break snapshot;
+                }
+            }
+        };
+        assert_eq!(last.digest, digest_after(short(), 20));
+        link.restart();
+    }
+}
