@@ -89,7 +89,8 @@ pub struct EnsembleFile {
     pub grid: GridSpec,
     /// `[n][S][5]`; rows of walls mean nothing.
     pub experts: Vec<Vec<[f64; ACTIONS]>>,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    // Written as null where there is none: messages (postcard) cannot leave a field out.
+    #[serde(default)]
     pub config: Option<Config>,
 }
 

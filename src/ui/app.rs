@@ -59,8 +59,8 @@ pub struct App {
     notice: Option<String>,
     pub view: View,
     pictures: Pictures,
-    /// The newest snapshot that the session has been told is drawn.
-    seen: u32,
+    /// A snapshot that has come and not been drawn yet.
+    undrawn: Option<u32>,
 }
 
 impl App {
@@ -84,7 +84,7 @@ impl App {
                 is_help_open: false,
             },
             pictures: Pictures::default(),
-            seen: 0,
+            undrawn: None,
         };
         app.load_preset(0);
         app
@@ -166,7 +166,6 @@ impl App {
             match event {
                 Ok(Event::Ready { protocol }) if protocol == PROTOCOL => {
                     self.session = Session::Ready;
-                    self.seen = 0;
                     self.send(Command::Speed(toolbar::SPEEDS[self.view.speed]));
                     self.send(Command::Show(self.view.clones.clone()));
                     self.load();
@@ -185,6 +184,7 @@ impl App {
 
     /// Puts a snapshot on the page.
     fn take(&mut self, mut snapshot: Snapshot) {
+        self.undrawn = Some(snapshot.number);
         let points = std::mem::take(&mut snapshot.curve);
         match &mut self.shown {
             Some(shown) if shown.started.run == snapshot.run && shown.snapshot.number < snapshot.number => {
@@ -215,10 +215,8 @@ impl App {
     pub fn show(&mut self, ui: &mut Ui) {
         self.hear();
         self.draw(ui);
-        let newest = self.shown.as_ref().map_or(0, |shown| shown.snapshot.number);
-        if newest > self.seen {
-            self.seen = newest;
-            self.send(Command::Seen(newest));
+        if let Some(number) = self.undrawn.take() {
+            self.send(Command::Seen(number));
         }
     }
 

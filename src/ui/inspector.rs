@@ -35,10 +35,11 @@ pub fn show(ui: &mut Ui, panels: &[Panel], grid: &Grid, cell: Option<usize>) {
         return;
     }
     ui.spacing_mut().interact_size.y = ROW - 3.0;
-    let experts = panels.iter().filter(|panel| panel.clone.is_none()).count();
+    let panels: Vec<_> = panels.iter().filter_map(|panel| Some((panel, panel.policy?))).collect();
+    let experts =
+        panels.iter().filter_map(|(panel, _)| panel.clone).map(|(_, p)| p.len() / grid.cells()).max().unwrap_or(0);
     ScrollArea::both().auto_shrink([false, true]).min_scrolled_height(height(experts)).show(ui, |ui| {
         Table::new("inspector").striped(false).spacing([8.0, 3.0]).min_col_width(0.0).show(ui, |ui| {
-            let panels: Vec<_> = panels.iter().filter_map(|panel| Some((panel, panel.policy?))).collect();
             ui.label("");
             for (panel, _) in &panels {
                 ui.label(RichText::new(&panel.short).small().strong());
@@ -60,8 +61,7 @@ pub fn show(ui: &mut Ui, panels: &[Panel], grid: &Grid, cell: Option<usize>) {
                 }
                 ui.end_row();
             }
-            let experts = panels.iter().filter_map(|(panel, _)| panel.clone).map(|(_, p)| p.len() / grid.cells()).max();
-            for expert in 0..experts.unwrap_or(0) {
+            for expert in 0..experts {
                 ui.label(quiet(&format!("p({}|s)", expert + 1)));
                 for (panel, _) in &panels {
                     match panel.clone {
