@@ -313,7 +313,9 @@ impl App {
     /// The run that is shown, by `draw`; then what the visitor did to it.
     fn show_board(&mut self, ui: &mut Ui, draw: fn(&Shown, &mut Ui, &View, &mut Pictures) -> Touched) {
         let Some(shown) = &self.shown else {
-            ui.label(RichText::new("The first policies are on their way …").color(Palette::of(ui).muted));
+            if !matches!(self.session, Session::Failed(_)) {
+                ui.label(RichText::new("The first policies are on their way …").color(Palette::of(ui).muted));
+            }
             return;
         };
         let touched = draw(shown, ui, &self.view, &mut self.pictures);

@@ -6,7 +6,7 @@ use egui_plot::{AxisHints, Line, LineStyle, Plot, PlotPoints, log_grid_spacer};
 use super::app::View;
 use super::numbers;
 use super::theme::Palette;
-use crate::lab::{CurvePoint, Snapshot};
+use crate::lab::{CurvePoint, RunState, Snapshot};
 use crate::mdp::RETURN_KINDS;
 
 /// Draws the curve of a run into all the space there is.
@@ -17,9 +17,13 @@ pub fn show(ui: &mut Ui, curve: &[CurvePoint], snapshot: &Snapshot, observer: &s
     let title = format!("Over training, {} ({unit}):", kind.label);
     let j = "J = ensemble − β·clone";
     let clone = format!("clone ({observer})");
+    if snapshot.state == RunState::Given {
+        ui.label(RichText::new("Over training: nothing, as this ensemble was given.").small().color(palette.muted));
+        return;
+    }
+    ui.spacing_mut().interact_size.y = 14.0;
+    ui.spacing_mut().item_spacing.y = 2.0;
     ui.horizontal_wrapped(|ui| {
-        ui.spacing_mut().interact_size.y = 14.0;
-        ui.spacing_mut().item_spacing.y = 2.0;
         ui.label(RichText::new(title).small().color(palette.muted));
         for (name, color) in [("ensemble", palette.accent), (&clone, palette.clone), (j, palette.muted)] {
             if name != j || kind.is_steps {

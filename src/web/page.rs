@@ -29,6 +29,10 @@ async fn run() -> Result<(), String> {
     let window = web_sys::window().ok_or("There is no window.")?;
     let document = window.document().ok_or("There is no document.")?;
     let element = |id: &str| document.get_element_by_id(id).ok_or(format!("The page has no element {id:?}."));
+    if element("message")?.get_attribute("role").as_deref() == Some("alert") {
+        // index.html has found something missing and says so.
+        return Ok(());
+    }
     let canvas: HtmlCanvasElement =
         element("canvas")?.dyn_into().map_err(|_| "The element \"canvas\" is no canvas.")?;
     let mirror = Mirror::new(element("mirror")?);
