@@ -37,7 +37,7 @@ pub const ALL: [Tool; 7] =
 pub fn install(tools: &[Tool]) -> Result<(), Failure> {
     tools.iter().try_for_each(|tool| match tool {
         Tool::WasmTarget => wasm_target(),
-        Tool::Trunk => cargo_program("trunk", "trunk", TRUNK, true, "6 minutes"),
+        Tool::Trunk => cargo_program("trunk", "trunk", TRUNK, true, "4 minutes"),
         // Without --locked: the lock file it was published with names a withdrawn crate.
         Tool::WasmBindgen => {
             cargo_program("wasm-bindgen-cli", "wasm-bindgen", &locked_wasm_bindgen()?, false, "2 minutes")
