@@ -51,8 +51,8 @@ pub struct App {
     setup: Setup,
     /// The place in [`PRESETS`] that `setup` was taken from, as long as nothing was changed since.
     preset: Option<usize>,
-    /// The newest run that the session has begun.
-    started: Option<Started>,
+    /// A run that has begun and shown nothing yet.
+    begun: Option<Started>,
     /// What is on the page: a run, its grid, its latest snapshot and its curve so far.
     shown: Option<Shown>,
     /// A sentence from the session about something it would not do.
@@ -72,7 +72,7 @@ impl App {
             session: Session::Starting,
             setup: Setup::default(),
             preset: None,
-            started: None,
+            begun: None,
             shown: None,
             notice: None,
             view: View {
@@ -106,8 +106,7 @@ impl App {
 
     /// Whether a run has begun that has not shown anything yet.
     pub fn is_retraining(&self) -> bool {
-        let begun = self.started.as_ref().map(|started| started.run);
-        matches!(self.session, Session::Ready) && begun != self.shown.as_ref().map(|shown| shown.snapshot.run)
+        self.begun.is_some()
     }
 
     /// Sends a command; while there is no session, none is needed: it will be told everything.
@@ -174,7 +173,7 @@ impl App {
                     let sentence = "The worker is of another version than the page: reload the page.";
                     self.session = Session::Failed(sentence.to_owned());
                 }
-                Ok(Event::Started(started)) => self.started = Some(*started),
+                Ok(Event::Started(started)) => self.begun = Some(*started),
                 Ok(Event::Snapshot(snapshot)) => self.take(*snapshot),
                 Ok(Event::Refused(sentence)) => self.notice = Some(sentence),
                 Err(sentence) => self.session = Session::Failed(sentence),
@@ -186,16 +185,11 @@ impl App {
     fn take(&mut self, mut snapshot: Snapshot) {
         self.undrawn = Some(snapshot.number);
         let points = std::mem::take(&mut snapshot.curve);
-        match &mut self.shown {
-            Some(shown) if shown.started.run == snapshot.run && shown.snapshot.number < snapshot.number => {
-                shown.curve.extend(points);
-                shown.snapshot = snapshot;
-            }
-            _ => {
-                // The first of a run: its own grid and optimal policy come with it.
-                let Some(started) = self.started.clone().filter(|started| started.run == snapshot.run) else { return };
-                self.shown = Shown::new(started, snapshot, points);
-            }
+        if let Some(started) = self.begun.take_if(|begun| begun.run == snapshot.run) {
+            self.shown = Shown::new(started, snapshot, points);
+        } else if let Some(shown) = self.shown.as_mut().filter(|shown| shown.started.run == snapshot.run) {
+            shown.curve.extend(points);
+            shown.snapshot = snapshot;
         }
     }
 }
@@ -299,7 +293,7 @@ impl App {
             let sentence = format!("{sentence} What is on the page stays; training needs a new worker.");
             if message(ui, &sentence, "Restart the worker") {
                 self.session = Session::Starting;
-                self.started = None;
+                self.begun = None;
                 self.link.restart();
             }
         }
