@@ -3,8 +3,8 @@
 //! The rooms, lower ones first; none imports one that stands below it in this list:
 //!
 //! - [`mdp`]: gridworlds, stationary policies, their exact returns. Knows nothing of ensembles.
-//! - [`ape`]: ensembles, who an observer takes the actor to be, and PG-APE, which trains them.
-//! - [`experiment`]: presets, and the figures of an ensemble as the paper reports them.
+//! - [`ape`]: ensembles, their files and figures, who an observer takes the actor to be, and PG-APE.
+//! - [`experiment`]: what a run starts from, the presets, and the course of a run.
 //! - [`lab`]: a training session as a state machine with messages in and out, and a thread to run it.
 //! - [`ui`]: the page, in egui and nothing else.
 //! - [`web`]: what only a browser has: the worker, the mirror of the page for assistive technology.

@@ -1,4 +1,4 @@
-#![cfg(not(target_arch = "wasm32"))]
+#![cfg(all(feature = "page", not(target_arch = "wasm32")))]
 //! The page as egui draws it, without a window: what it says, what its controls do, that nothing is cut off.
 
 use std::cell::RefCell;

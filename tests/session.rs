@@ -163,6 +163,44 @@ fn speed_is_kept() {
     desk.send(Command::Speed(None));
     desk.run(1000.0);
     assert_eq!(desk.last().state, RunState::Finished);
+    desk.load(Config { total_steps: 100_000, ..short() }, true);
+    desk.send(Command::Speed(Some(1.0)));
+    desk.run(10_500.0);
+    assert!((9..=11).contains(&desk.last().update), "{}", desk.last().update);
+}
+
+/// Retraining is as fast as it goes; what follows keeps the speed that was set, from its first moment on.
+#[test]
+fn retraining_takes_nothing_from_the_speed() {
+    let mut desk = Desk::new();
+    desk.tick = 0.01;
+    desk.load(short(), true);
+    desk.send(Command::Speed(Some(100.0)));
+    for beta in [0.1, 0.2, 0.3] {
+        desk.send(Command::Retrain { beta });
+        desk.run(500.0);
+        assert_eq!((desk.last().beta, desk.last().state), (beta, RunState::Finished));
+    }
+    desk.load(Config { total_steps: 100_000, ..short() }, true);
+    desk.run(1000.0);
+    assert!((90..=130).contains(&desk.last().update), "{}", desk.last().update);
+}
+
+/// A β that waits for its run is the one that counts, whatever comes next; and it is trained once.
+#[test]
+fn a_waiting_beta_is_not_lost_and_not_left_over() {
+    for command in [Command::Step, Command::Pause, Command::Reset, Command::Play] {
+        let mut desk = Desk::new();
+        desk.load(short(), false);
+        desk.send(Command::Retrain { beta: 0.2 });
+        desk.send(Command::Retrain { beta: 0.4 });
+        desk.send(command.clone());
+        desk.run(1e6);
+        assert_eq!(desk.last().beta, 0.4, "{command:?}");
+        desk.send(Command::Retrain { beta: 0.7 });
+        desk.run(1e6);
+        assert_eq!((desk.last().beta, desk.last().state), (0.7, RunState::Finished), "{command:?}");
+    }
 }
 
 #[test]

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::Config;
-use crate::mdp::{ACTIONS, Grid, GridError, GridSpec, Policy, PolicyError};
+use crate::mdp::{ACTIONS, Grid, GridError, GridSpec, Policy, PolicyError, Returns, Solver};
 
 /// n experts; one of them, drawn uniformly, acts for a whole episode.
 #[derive(Clone, Debug, PartialEq)]
@@ -24,6 +24,11 @@ impl Ensemble {
     /// n.
     pub fn experts(&self) -> usize {
         self.policies.len()
+    }
+
+    /// Exact returns of every expert, `[n]`; the ensemble's are their mean.
+    pub fn returns(&self, solver: &mut Solver, horizon: u32) -> Vec<Returns> {
+        self.policies.iter().map(|policy| solver.evaluate(policy, horizon).returns).collect()
     }
 
     /// π_o(a|s) = Σ_c p(c|s) π_c(a|s) (paper, Eq. 1): what an observer ends up with.
@@ -126,9 +131,15 @@ impl EnsembleFile {
         }
     }
 
-    /// Reads the JSON text of a file; [`EnsembleFile::check`] then says whether it makes sense.
+    /// Reads the JSON text of a file; [`EnsembleFile::check`] then says whether it makes sense. A `config` that
+    /// is not ours is left out: it does not change what the ensemble is.
     pub fn parse(text: &str) -> Result<EnsembleFile, EnsembleError> {
-        serde_json::from_str(text).map_err(|error| EnsembleError::Json(error.to_string()))
+        let json = |error: serde_json::Error| EnsembleError::Json(error.to_string());
+        let mut value: serde_json::Value = serde_json::from_str(text).map_err(json)?;
+        let config = value.as_object_mut().and_then(|fields| fields.remove("config"));
+        let file: EnsembleFile = serde_json::from_value(value).map_err(json)?;
+        let config = config.and_then(|config| serde_json::from_value(config).ok());
+        Ok(EnsembleFile { config: config.filter(|config: &Config| config.check().is_ok()), ..file })
     }
 
     /// The grid and the ensemble, when everything about them is valid.

@@ -11,8 +11,8 @@ pub struct Field {
     pub name: &'static str,
     /// As on the page.
     pub label: &'static str,
-    /// The paper's value, as text.
-    pub paper: &'static str,
+    /// The paper's value, as text, where it has one.
+    pub paper: Option<&'static str>,
     pub help: &'static str,
     pub kind: Kind,
 }
@@ -128,21 +128,21 @@ pub static FIELDS: [Field; 15] = [
     Field {
         name: "experts",
         label: "Experts n",
-        paper: "2",
+        paper: Some("2"),
         help: "Number of expert policies. One of them, drawn at random, acts for a whole episode.",
         kind: whole!(experts, 1, Config::MAX_EXPERTS),
     },
     Field {
         name: "beta",
         label: "β",
-        paper: "0.6",
+        paper: Some("0.6"),
         help: "Weight of the clone's return in J = E[ensemble] − β E[clone] (Eq. 3). At 0 the experts care only about the goal.",
         kind: real!(beta, 0.0, Config::MAX_BETA),
     },
     Field {
         name: "observer",
         label: "Observer",
-        paper: "replay(60)",
+        paper: Some("replay(60)"),
         help: "Who the experts take the cloner to be: how it guesses which expert acted at a cell, p(c|s) (Eq. 1).",
         kind: Kind::Word {
             options: || OBSERVERS.iter().zip(ObserverChoice::all()).map(|(_, choice)| choice.to_string()).collect(),
@@ -153,84 +153,84 @@ pub static FIELDS: [Field; 15] = [
     Field {
         name: "gradient",
         label: "Clone gradient",
-        paper: "sampled_context",
+        paper: Some("sampled_context"),
         help: "∇ log π_o by the one expert that was drawn with the action, or by every expert's responsibility for it (appendix).",
         kind: word!(gradient, "sampled_context" => GradientKind::SampledContext, "mixture" => GradientKind::Mixture),
     },
     Field {
         name: "learning_rate",
         label: "Learning rate",
-        paper: "0.05",
+        paper: Some("0.05"),
         help: "Step size of Adam, for policies and baselines.",
         kind: real!(learning_rate, 0.0, 10.0),
     },
     Field {
         name: "value_weight",
         label: "Value weight",
-        paper: "0.5",
+        paper: Some("0.5"),
         help: "Weight of the baseline's squared error (Eq. 4). Adam takes most of its effect away where baselines are tables of their own.",
         kind: real!(value_weight, 0.0, 1000.0),
     },
     Field {
         name: "baseline",
         label: "Baseline",
-        paper: "joint",
+        paper: Some("joint"),
         help: "One table fitted to R on the ensemble's episodes and to −βR on the clone's (Eq. 4), or a table for each: less variance.",
         kind: word!(baseline, "joint" => BaselineKind::Joint, "separate" => BaselineKind::Separate),
     },
     Field {
         name: "entropy_start",
         label: "Entropy bonus, first update",
-        paper: "0.5",
+        paper: Some("0.5"),
         help: "Weight of the mean entropy of visited states at the first update; it then falls linearly.",
         kind: real!(entropy_start, 0.0, 1000.0),
     },
     Field {
         name: "entropy_end",
         label: "Entropy bonus, last update",
-        paper: "0.005",
+        paper: Some("0.005"),
         help: "Weight of the entropy bonus at the last update.",
         kind: real!(entropy_end, 0.0, 1000.0),
     },
     Field {
         name: "discount",
         label: "Discount γ",
-        paper: "0.99",
+        paper: Some("0.99"),
         help: "What a step's reward counts one step earlier.",
         kind: real!(discount, 0.0, 1.0),
     },
     Field {
         name: "return_to_go",
         label: "Discount counts",
-        paper: "from_step",
+        paper: None,
         help: "R(t) = Σ γ^(t'−t) r from the step on, as the paper's scale of Ṽ suggests; or Σ γ^t' r, as in its section 2.2, the exact gradient.",
         kind: word!(return_to_go, "from_step" => ReturnToGo::FromStep, "from_start" => ReturnToGo::FromStart),
     },
     Field {
         name: "horizon",
         label: "Horizon T (steps)",
-        paper: "100",
+        paper: Some("100"),
         help: "Longest episode, in steps.",
         kind: whole!(horizon, 1, 10_000),
     },
     Field {
         name: "batch_steps",
         label: "Batch (steps)",
-        paper: "4096",
+        paper: Some("4096"),
         help: "Whole episodes are played until at least this many steps, with the ensemble and again with the clone.",
         kind: whole!(batch_steps, 1, 1_000_000),
     },
     Field {
         name: "total_steps",
         label: "Run (ensemble steps)",
-        paper: "3000000",
+        paper: Some("3000000"),
         help: "Length of a run in ensemble steps: divided by the batch it gives the number of updates, 732 in the paper.",
         kind: whole!(total_steps, 1, u32::MAX),
     },
     Field {
         name: "seed",
         label: "Seed",
-        paper: "–",
+        paper: None,
         help: "Everything random comes from it: the same seed gives the same run, to the last bit, in every browser and natively.",
         kind: whole!(seed, 0, u32::MAX),
     },
@@ -257,8 +257,10 @@ mod tests {
     #[test]
     fn the_paper_column_is_the_papers_configuration() {
         let mut config = Config::default();
-        for field in FIELDS.iter().filter(|field| field.paper != "–") {
-            field.set(&mut config, field.paper).unwrap();
+        for field in &FIELDS {
+            if let Some(value) = field.paper {
+                field.set(&mut config, value).unwrap();
+            }
         }
         assert_eq!(config, Config::paper());
     }

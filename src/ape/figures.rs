@@ -9,6 +9,8 @@ use crate::mdp::{Grid, Returns, Solver, occupancy, optimal_policy};
 /// What is reported of an ensemble; the keys are those of its JSON.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Figures {
+    /// T, in steps.
+    pub horizon: u32,
     pub experts: Vec<Returns>,
     /// The mean of the experts'.
     pub ensemble: Returns,
@@ -36,8 +38,7 @@ impl Figures {
     /// All figures of an ensemble, exact; `horizon` is T.
     pub fn of(grid: &Grid, ensemble: &Ensemble, horizon: u32) -> Figures {
         let mut solver = Solver::new(grid);
-        let experts: Vec<Returns> =
-            ensemble.policies().iter().map(|policy| solver.evaluate(policy, horizon).returns).collect();
+        let experts = ensemble.returns(&mut solver, horizon);
         let uniform = ensemble.cloned(&Contexts::equal(grid.cells(), ensemble.experts()));
         let honest = ObserverChoice::OCCUPANCY.contexts(grid, ensemble, horizon, 0);
         let clone = solver.evaluate(&ensemble.cloned(&honest), horizon);
@@ -47,6 +48,7 @@ impl Figures {
         let after_cut: f64 =
             played.iter().flat_map(|o| o.cut_off.iter().zip(&clone.hitting_time)).map(|(m, h)| m * h).sum();
         Figures {
+            horizon,
             ensemble: Returns::mean(&experts),
             experts,
             clone_uniform: solver.evaluate(&uniform, horizon).returns,

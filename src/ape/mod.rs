@@ -1,6 +1,6 @@
 //! Adversarial policy ensembles: what they are, who clones them, and the training of the paper.
 //!
-//! Knows grids and policies ([`crate::mdp`]), and nothing of sessions, pages or files.
+//! Knows grids and policies ([`crate::mdp`]), and nothing of sessions or pages.
 
 mod adam;
 mod config;

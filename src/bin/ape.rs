@@ -6,8 +6,8 @@ use std::path::Path;
 use std::process::ExitCode;
 
 use ape_lab::ape::{EnsembleFile, FIELDS, Field, Figures, Trainer};
-use ape_lab::experiment::{PRESETS, Preset, Setup};
-use ape_lab::mdp::{Grid, HORIZON, RETURN_KINDS, Returns, Solver};
+use ape_lab::experiment::{CurvePoint, PRESETS, Preset, Setup};
+use ape_lab::mdp::{Grid, HORIZON, Returns};
 use clap::{Arg, ArgMatches, Command};
 use serde::Serialize;
 
@@ -53,7 +53,8 @@ fn command() -> Command {
         .arg(file("out", "Write the ensemble to this file"))
         .arg(file("curve", "Write the figures after every update to this CSV file"));
     for field in &FIELDS {
-        let help = format!("{} Paper: {}.", field.help, field.paper);
+        let paper = field.paper.map(|value| format!(" Paper: {value}.")).unwrap_or_default();
+        let help = format!("{}{paper}", field.help);
         let flag = field.name.replace('_', "-");
         train = train.arg(Arg::new(field.name).long(flag).value_name("VALUE").allow_hyphen_values(true).help(help));
     }
@@ -94,9 +95,11 @@ fn print(result: &impl Serialize) -> Result<(), String> {
 fn evaluate(matches: &ArgMatches) -> Result<(), String> {
     let file = matches.get_one::<String>("file").expect("clap requires it");
     let in_file = |error| format!("{file}: {error}");
-    let (grid, ensemble) =
-        EnsembleFile::parse(&read(file)?).and_then(EnsembleFile::check).map_err(|error| in_file(error.to_string()))?;
-    print(&Figures::of(&grid, &ensemble, HORIZON))
+    let parsed = EnsembleFile::parse(&read(file)?).map_err(|error| in_file(error.to_string()))?;
+    // The T it was trained with, where the file says so.
+    let horizon = parsed.config.as_ref().map_or(HORIZON, |config| config.horizon);
+    let (grid, ensemble) = parsed.check().map_err(|error| in_file(error.to_string()))?;
+    print(&Figures::of(&grid, &ensemble, horizon))
 }
 
 fn presets() -> Result<(), String> {
@@ -151,29 +154,12 @@ fn train(matches: &ArgMatches) -> Result<(), String> {
     let horizon = config.horizon;
     let grid = Grid::new(grid).map_err(|error| error.to_string())?;
     let mut trainer = Trainer::new(grid.clone(), config.clone()).map_err(|error| error.to_string())?;
-    let mut solver = Solver::new(&grid);
     let curve_file = matches.get_one::<String>("curve");
-    let mut curve = "update".to_owned();
-    for of in ["ensemble", "clone"] {
-        for kind in &RETURN_KINDS {
-            curve += &format!(",{of}_{}", kind.name);
-        }
-    }
-    curve += "\n";
-    for update in 1..=config.updates() {
+    let mut curve = vec![CurvePoint::csv_head()];
+    for _ in 0..config.updates() {
         trainer.update();
         if curve_file.is_some() {
-            let ensemble = trainer.ensemble();
-            let experts: Vec<Returns> =
-                ensemble.policies().iter().map(|policy| solver.evaluate(policy, horizon).returns).collect();
-            let clone = solver.evaluate(&ensemble.cloned(&trainer.contexts()), horizon).returns;
-            curve += &update.to_string();
-            for returns in [Returns::mean(&experts), clone] {
-                for kind in &RETURN_KINDS {
-                    curve += &format!(",{}", (kind.get)(&returns));
-                }
-            }
-            curve += "\n";
+            curve.push(CurvePoint::of(&mut trainer).csv_line());
         }
     }
     let ensemble = trainer.ensemble();
@@ -182,13 +168,13 @@ fn train(matches: &ArgMatches) -> Result<(), String> {
         write(file, &(text.map_err(|error| error.to_string())? + "\n"))?;
     }
     if let Some(file) = curve_file {
-        write(file, &curve)?;
+        write(file, &(curve.join("\n") + "\n"))?;
     }
     print(&Trained {
         updates: trainer.updates(),
         digest: format!("{:016x}", trainer.digest()),
         observer: config.observer.to_string(),
-        clone: solver.evaluate(&ensemble.cloned(&trainer.contexts()), horizon).returns,
+        clone: CurvePoint::of(&mut trainer).clone,
         figures: Figures::of(&grid, &ensemble, horizon),
     })
 }

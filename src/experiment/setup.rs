@@ -36,8 +36,12 @@ impl Setup {
         };
         let grid: GridSpec =
             fields.remove("grid").map_or(Ok(GridSpec::default()), serde_json::from_value).map_err(json)?;
-        let config = fields.remove("config").unwrap_or(serde_json::Value::Object(fields));
-        let config: Config = serde_json::from_value(config).map_err(json)?;
+        let config = match fields.remove("config") {
+            // An ensemble file that does not say how it was made.
+            None | Some(serde_json::Value::Null) if fields.contains_key("format") => Config::default(),
+            Some(config) => serde_json::from_value(config).map_err(json)?,
+            None => serde_json::from_value(serde_json::Value::Object(fields)).map_err(json)?,
+        };
         Grid::new(grid.clone())?;
         config.check()?;
         Ok(Setup { grid, config, ensemble: None })
@@ -56,6 +60,10 @@ mod tests {
             "grid": {"rows": 3, "cols": 4, "goal": [1, 1], "walls": [[0, 0]], "slip": 0.1}}"#;
         let setup = Setup::parse(file).unwrap();
         assert_eq!((setup.grid.cols, setup.config.seed), (4, 5));
+        for config in [r#","config": null"#, ""] {
+            let file = format!(r#"{{"format": "ape-ensemble", "version": 1, "experts": []{config}}}"#);
+            assert_eq!(Setup::parse(&file).unwrap(), Setup::default());
+        }
     }
 
     #[test]

@@ -11,7 +11,7 @@ mod session;
 mod thread;
 
 pub use link::Link;
-pub use protocol::{CloneView, Command, CurvePoint, Event, PROTOCOL, PolicyView, RunState, Snapshot, Started};
+pub use protocol::{CloneView, Command, Event, PROTOCOL, PolicyView, RunState, Snapshot, Started};
 pub use protocol::{decode, encode};
 pub use session::{Pace, Session};
 #[cfg(not(target_arch = "wasm32"))]

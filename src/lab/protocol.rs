@@ -5,7 +5,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::ape::observer::ObserverChoice;
-use crate::experiment::Setup;
+use crate::experiment::{CurvePoint, Setup};
 use crate::mdp::Returns;
 
 /// Version of the messages: an old cached worker must not be taken for a new one. [`Event::Ready`] stays the
@@ -89,7 +89,7 @@ pub struct Snapshot {
     pub beta: f64,
     /// Hash of all parameters: equal runs share it, on every machine.
     pub digest: u64,
-    /// Time spent on updates in this run, in milliseconds.
+    /// Time spent on updates while playing this run, in milliseconds.
     pub training_ms: f64,
     pub experts: Vec<PolicyView>,
     /// First that of the run's own observer, then those asked for.
@@ -110,7 +110,7 @@ impl Snapshot {
 pub struct PolicyView {
     /// π(a|s), `[S][5]`.
     pub policy: Vec<[f32; 5]>,
-    /// h(s) in steps, uncapped, `[S]`.
+    /// h(s) in steps, uncapped, `[S]`; what is longer than `f32::MAX` is that.
     pub hitting_time: Vec<f32>,
     pub returns: Returns,
 }
@@ -122,16 +122,6 @@ pub struct CloneView {
     /// p(c|s), `[S][n]`.
     pub contexts: Vec<f32>,
     pub view: PolicyView,
-}
-
-/// Exact returns at one update.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct CurvePoint {
-    pub update: u32,
-    pub beta: f64,
-    pub ensemble: Returns,
-    /// Of the clone by the run's own observer.
-    pub clone: Returns,
 }
 
 /// A message as bytes.

@@ -3,11 +3,11 @@
 //! It is driven from outside: [`Session::handle`] takes a command, [`Session::advance`] works for a few
 //! milliseconds and says when to call it again, [`Session::events`] hands out what is to be sent.
 
-use super::{CloneView, Command, CurvePoint, Event, PolicyView, RunState, Snapshot, Started};
+use super::{CloneView, Command, Event, PolicyView, RunState, Snapshot, Started};
 use crate::ape::observer::ObserverChoice;
 use crate::ape::{Config, Contexts, Ensemble, EnsembleFile, Trainer};
-use crate::experiment::Setup;
-use crate::mdp::{Grid, Policy, Returns, Solver, Value, optimal_policy};
+use crate::experiment::{CurvePoint, Setup};
+use crate::mdp::{Grid, Policy, Solver, Value, optimal_policy};
 
 /// Longest stretch of work between two looks at the inbox, in milliseconds.
 const STRETCH: f64 = 8.0;
@@ -112,26 +112,32 @@ impl Session {
                 }
             }
             Command::Continue { beta } => {
+                self.begin_queued()?;
                 let run = self.training()?;
                 run.trainer_mut().set_beta(beta).map_err(|error| error.to_string())?;
                 run.setup.config.beta = beta;
                 run.go_on();
             }
-            Command::Play => self.training()?.go_on(),
+            Command::Play => {
+                self.begin_queued()?;
+                self.training()?.go_on();
+            }
             Command::Pause => {
+                self.begin_queued()?;
                 let run = self.training()?;
                 (run.is_playing, run.is_silent) = (false, false);
-                self.next_beta = None;
             }
             Command::Step => {
+                self.begin_queued()?;
                 let run = self.training()?;
                 (run.is_playing, run.is_silent) = (false, false);
                 run.last_update = run.last_update.max(run.trainer().updates() + 1);
-                run.update();
+                run.trainer_mut().update();
+                run.after_update();
             }
             Command::Reset => {
+                self.begin_queued()?;
                 let setup = self.run.as_ref().ok_or(NOTHING)?.setup.clone();
-                self.next_beta = None;
                 self.begin(setup, false, false)?;
             }
             Command::Speed(speed) => {
@@ -156,6 +162,12 @@ impl Session {
             Some(_) => Err("This ensemble was given: there is nothing to train.".to_owned()),
             None => Err(NOTHING.to_owned()),
         }
+    }
+
+    /// Begins the run of a β that was asked for while another was being trained: the β on the page is the
+    /// one that counts, whatever is done next.
+    fn begin_queued(&mut self) -> Result<(), String> {
+        self.next_beta.take().map_or(Ok(()), |beta| self.retrain(beta))
     }
 
     fn retrain(&mut self, beta: f64) -> Result<(), String> {
@@ -198,6 +210,7 @@ impl Session {
         };
         run.add_curve_point();
         self.run = Some(run);
+        self.allowance = 0.0;
         self.is_changed = true;
         Ok(())
     }
@@ -209,10 +222,10 @@ impl Session {
         let mut pace = self.train(now, clock);
         if let Some(run) = &self.run {
             let has_ended = run.is_silent && !run.is_playing;
-            if has_ended && let Some(beta) = self.next_beta.take() {
+            if has_ended && self.next_beta.is_some() {
                 // The newest β is wanted; what was trained is shown all the same, for the eye to follow.
                 self.snapshot(clock);
-                if let Err(sentence) = self.retrain(beta) {
+                if let Err(sentence) = self.begin_queued() {
                     self.outbox.push(Event::Refused(sentence));
                 }
                 return Pace::Now;
@@ -243,16 +256,18 @@ impl Session {
         let speed = self.speed.filter(|_| !run.is_silent).map(f64::from);
         if let Some(speed) = speed {
             // No more than a quarter of a second is made up for after a pause.
-            self.allowance = (self.allowance + since.clamp(0.0, 250.0) * speed / 1000.0).min((speed / 4.0).max(1.0));
+            self.allowance = (self.allowance + since.max(0.0) * speed / 1000.0).min((speed / 4.0).max(1.0));
         }
-        let mut end = now;
-        while run.is_playing && end - now < STRETCH && (speed.is_none() || self.allowance >= 1.0) {
-            self.allowance -= 1.0;
-            run.update();
+        while run.is_playing && clock() - now < STRETCH && (speed.is_none() || self.allowance >= 1.0) {
+            if speed.is_some() {
+                self.allowance -= 1.0;
+            }
+            let begin = clock();
+            run.trainer_mut().update();
+            run.training_ms += clock() - begin;
+            run.after_update();
             self.is_changed = true;
-            end = clock();
         }
-        run.training_ms += end - now;
         match speed {
             _ if !run.is_playing => Pace::Idle,
             Some(speed) if self.allowance < 1.0 => Pace::After((1.0 - self.allowance) * 1000.0 / speed),
@@ -299,8 +314,8 @@ impl Run {
         (self.is_playing, self.is_silent) = (true, false);
     }
 
-    fn update(&mut self) {
-        self.trainer_mut().update();
+    /// What follows an update: the curve, and the end of the run.
+    fn after_update(&mut self) {
         let updates = self.trainer().updates();
         if updates >= self.last_update {
             self.is_playing = false;
@@ -328,16 +343,9 @@ impl Run {
     }
 
     fn add_curve_point(&mut self) {
-        let Subject::Training(trainer) = &self.subject else { return };
-        let (update, beta) = (trainer.updates(), trainer.config().beta);
-        let ensemble = self.ensemble();
-        let clone = ensemble.cloned(&self.own_contexts(&ensemble));
-        let horizon = self.setup.config.horizon;
-        let mut solver = Solver::new(self.subject.grid());
-        let experts: Vec<Returns> =
-            ensemble.policies().iter().map(|policy| solver.evaluate(policy, horizon).returns).collect();
-        let clone = solver.evaluate(&clone, horizon).returns;
-        self.curve.push(CurvePoint { update, beta, ensemble: Returns::mean(&experts), clone });
+        if let Subject::Training(trainer) = &mut self.subject {
+            self.curve.push(CurvePoint::of(trainer));
+        }
     }
 
     fn snapshot(&mut self, number: u32, run: u32, show: &[ObserverChoice]) -> Snapshot {
@@ -390,7 +398,7 @@ impl Run {
 fn policy_view(policy: &Policy, value: Value) -> PolicyView {
     PolicyView {
         policy: policy.rows().iter().map(|row| row.map(|p| p as f32)).collect(),
-        hitting_time: value.hitting_time.iter().map(|&h| h as f32).collect(),
+        hitting_time: value.hitting_time.iter().map(|&h| (h as f32).min(f32::MAX)).collect(),
         returns: value.returns,
     }
 }

@@ -41,7 +41,10 @@ impl Policy {
             if (sum - 1.0).abs() > Self::TOLERANCE {
                 return Err(PolicyError::Sum { cell, sum });
             }
-            *row = row.map(|p| p / sum);
+            // What is 1 but for the last bits stays as it is: a file reads back as it was written.
+            if (sum - 1.0).abs() > 1e-12 {
+                *row = row.map(|p| p / sum);
+            }
         }
         Ok(Policy { rows })
     }

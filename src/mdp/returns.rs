@@ -19,6 +19,10 @@ pub const HORIZON: u32 = 100;
 /// The noise that gives every cell a hitting time (paper, appendix): π̃ = (1 − 1e−9)π + 1e−9·uniform.
 const NOISE: f64 = 1e-9;
 
+/// Hitting times are cut here, in steps: a policy that walks away from the goal on a large grid comes back
+/// after 10⁹ steps to the power of its distance, which is more than any number.
+const LONGEST: f64 = 1e300;
+
 /// The four returns of a stationary policy, in steps (negative) and probability. Means run over all free
 /// cells, the goal included, except for `success`, which runs over the cells where episodes start.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -177,7 +181,8 @@ impl<'g> Solver<'g> {
         for k in 0..cells {
             let (above, below) = self.band.split_at_mut((k + 1) * stride);
             let pivot = &above[k * stride + width + 1..];
-            leaves[k] = pivot.iter().sum::<f64>() + self.to_goal[k];
+            // What never leaves but by many noisy steps in a row may leave with a probability below any number.
+            leaves[k] = (pivot.iter().sum::<f64>() + self.to_goal[k]).max(f64::MIN_POSITIVE);
             for i in k + 1..cells.min(k + width + 1) {
                 let row = &mut below[(i - k - 1) * stride..(i - k) * stride];
                 let from = k + width - i;
@@ -189,7 +194,7 @@ impl<'g> Solver<'g> {
                     *entry += factor * p;
                 }
                 self.to_goal[i] += factor * self.to_goal[k];
-                steps[i] += factor * steps[k];
+                steps[i] = (steps[i] + factor * steps[k]).min(LONGEST);
             }
         }
         // The goal and walls are cut out: nothing leads to them in the band, and they take no steps.
@@ -199,7 +204,7 @@ impl<'g> Solver<'g> {
             let sum: f64 = ahead.iter().zip(&solution[k + 1..]).map(|(p, h)| p * h).sum();
             let state = self.order[k];
             let is_start = state != self.grid.goal() && !self.grid.is_wall(state);
-            solution[k] = if is_start { (steps[k] + sum) / leaves[k] } else { 0.0 };
+            solution[k] = if is_start { ((steps[k] + sum) / leaves[k]).min(LONGEST) } else { 0.0 };
         }
         (0..cells).map(|state| solution[self.position[state]]).collect()
     }
@@ -306,6 +311,19 @@ mod tests {
         assert!((value.hitting_time[1] * NOISE / 5.0 - 1.0).abs() < 1e-12);
         assert!((value.returns.capped_return + 200.0 / 3.0).abs() < 1e-12);
         assert_eq!((value.returns.horizon_return, value.returns.success), (-200.0 / 3.0, 0.0));
+    }
+
+    /// Walking away from the goal on the largest grid: hitting times beyond all numbers, and still figures.
+    #[test]
+    fn hitting_times_too_long_for_a_number_are_cut() {
+        let grid = Grid::new(GridSpec { rows: 32, cols: 32, ..GridSpec::default() }).unwrap();
+        let row =
+            |state: usize| if grid.cell(state).0 < 31 { [0.0, 1.0, 0.0, 0.0, 0.0] } else { [0.0, 0.0, 0.0, 1.0, 0.0] };
+        let away = Policy::from_rows((0..grid.cells()).map(row).collect());
+        let value = Solver::new(&grid).evaluate(&away, HORIZON);
+        assert!(value.hitting_time.iter().all(|h| h.is_finite()));
+        assert!(value.returns.uncapped_return <= -1e290 && value.returns.uncapped_return.is_finite());
+        assert_eq!(value.returns.capped_return, -100.0 * 1023.0 / 1024.0);
     }
 
     /// Occupancy and the horizon return count the same steps from two sides.

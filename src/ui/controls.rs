@@ -84,7 +84,7 @@ fn show_field(ui: &mut Ui, field: &Field, config: &mut Config) {
     ui.add_space(2.0);
     ui.label(RichText::new(field.label).small());
     ui.horizontal(|ui| {
-        let tip = format!("{} Paper: {}. Expected: {}.", field.help, field.paper, field.expected());
+        let tip = format!("{} Expected: {}.", field.help, field.expected());
         match &field.kind {
             Kind::Real { low, high, get, set } => {
                 let mut value = get(config);
@@ -121,9 +121,11 @@ fn show_field(ui: &mut Ui, field: &Field, config: &mut Config) {
                 response.accessible_name(field.label).on_hover_text(tip);
             }
         }
-        let mut paper = Config::default();
-        let is_papers = field.set(&mut paper, field.paper).is_ok() && field.text(&paper) == field.text(config);
-        let mark = if is_papers { "as in the paper".to_owned() } else { format!("paper: {}", field.paper) };
-        ui.label(RichText::new(mark).small().color(if is_papers { palette.muted } else { palette.warning }));
+        if let Some(value) = field.paper {
+            let mut paper = Config::default();
+            let is_papers = field.set(&mut paper, value).is_ok() && field.text(&paper) == field.text(config);
+            let mark = if is_papers { "as in the paper".to_owned() } else { format!("paper: {value}") };
+            ui.label(RichText::new(mark).small().color(if is_papers { palette.muted } else { palette.warning }));
+        }
     });
 }

@@ -11,6 +11,9 @@ pub fn decimal(value: f64, decimals: usize) -> String {
 
 /// Steps or a return, short: one decimal, and powers of ten where it is huge.
 pub fn steps(value: f64) -> String {
+    if value.abs() >= f64::from(f32::MAX) {
+        return if value < 0.0 { "< −10³⁸" } else { "> 10³⁸" }.to_owned();
+    }
     if value.abs() < 9999.5 {
         return decimal(value, 1);
     }
@@ -50,6 +53,7 @@ mod tests {
         assert_eq!(steps(-0.01), "0.0");
         assert_eq!(steps(-1.67e9), "−1.7×10⁹");
         assert_eq!(steps(12345.0), "1.2×10⁴");
+        assert_eq!((steps(-1e300).as_str(), steps(f64::INFINITY).as_str()), ("< −10³⁸", "> 10³⁸"));
         assert_eq!([0.0, 1.0, 0.999_99, 0.001, 0.136].map(percent), ["0 %", "100 %", "> 99 %", "< 1 %", "14 %"]);
     }
 }
