@@ -192,6 +192,12 @@ fn play_pause_step_and_reset_have_buttons() {
         page.get_by_role_and_label(Role::Button, button).click_accesskit();
         page.run_steps(3);
         assert_eq!(here.0.borrow().commands.iter().rfind(|c| !matches!(c, Command::Seen(_))), Some(&command));
+        if command == Command::Reset {
+            // Uniform policies hardly arrive, and the page says so.
+            page.get_by(|node| {
+                says(node).is_some_and(|text| text.starts_with("The 2 experts arrive in 16 % of episodes"))
+            });
+        }
     }
 }
 
@@ -204,6 +210,7 @@ fn a_dead_worker_can_be_replaced() {
     page.run_steps(3);
     page.get_by(|node| node.role() == Role::Alert && says(node).is_some_and(|text| text.contains("out of memory")));
     assert_eq!(figure(&page, "Ensemble capped"), before);
+    page.get_by(|node| says(node).is_some_and(|text| text == "stopped at update 732 of 732"));
     page.get_by_role_and_label(Role::Button, "Restart the worker").click_accesskit();
     page.run_steps(3);
     settle(&mut page);

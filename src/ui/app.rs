@@ -59,6 +59,8 @@ pub struct App {
     notice: Option<String>,
     pub view: View,
     pictures: Pictures,
+    /// Snapshots taken in, over all sessions.
+    taken: u64,
     /// A snapshot that has come and not been drawn yet.
     undrawn: Option<u32>,
 }
@@ -84,6 +86,7 @@ impl App {
                 is_help_open: false,
             },
             pictures: Pictures::default(),
+            taken: 0,
             undrawn: None,
         };
         app.load_preset(0);
@@ -107,6 +110,11 @@ impl App {
     /// Whether a run has begun that has not shown anything yet.
     pub fn is_retraining(&self) -> bool {
         self.begun.is_some()
+    }
+
+    /// Whether there is a session, or one on its way.
+    pub fn is_session_alive(&self) -> bool {
+        !matches!(self.session, Session::Failed(_))
     }
 
     /// Sends a command; while there is no session, none is needed: it will be told everything.
@@ -176,20 +184,25 @@ impl App {
                 Ok(Event::Started(started)) => self.begun = Some(*started),
                 Ok(Event::Snapshot(snapshot)) => self.take(*snapshot),
                 Ok(Event::Refused(sentence)) => self.notice = Some(sentence),
-                Err(sentence) => self.session = Session::Failed(sentence),
+                Err(sentence) => {
+                    self.session = Session::Failed(sentence);
+                    self.begun = None;
+                }
             }
         }
     }
 
     /// Puts a snapshot on the page.
     fn take(&mut self, mut snapshot: Snapshot) {
+        self.taken += 1;
         self.undrawn = Some(snapshot.number);
         let points = std::mem::take(&mut snapshot.curve);
         if let Some(started) = self.begun.take_if(|begun| begun.run == snapshot.run) {
-            self.shown = Shown::new(started, snapshot, points);
+            self.shown = Shown::new(started, snapshot, points, self.taken);
         } else if let Some(shown) = self.shown.as_mut().filter(|shown| shown.started.run == snapshot.run) {
             shown.curve.extend(points);
             shown.snapshot = snapshot;
+            shown.version = self.taken;
         }
     }
 }
@@ -293,7 +306,6 @@ impl App {
             let sentence = format!("{sentence} What is on the page stays; training needs a new worker.");
             if message(ui, &sentence, "Restart the worker") {
                 self.session = Session::Starting;
-                self.begun = None;
                 self.link.restart();
             }
         }
@@ -307,7 +319,7 @@ impl App {
     /// The run that is shown, by `draw`; then what the visitor did to it.
     fn show_board(&mut self, ui: &mut Ui, draw: fn(&Shown, &mut Ui, &View, &mut Pictures) -> Touched) {
         let Some(shown) = &self.shown else {
-            if !matches!(self.session, Session::Failed(_)) {
+            if self.is_session_alive() {
                 ui.label(RichText::new("The first policies are on their way …").color(Palette::of(ui).muted));
             }
             return;

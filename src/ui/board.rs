@@ -7,7 +7,8 @@ use super::heatmap::{self, Pictures};
 use super::panels::{self, Panel, Plan, Touched};
 use super::theme::{self, GAP, NARROW};
 use super::{chart, inspector};
-use crate::lab::{CurvePoint, Snapshot, Started};
+use crate::experiment::CurvePoint;
+use crate::lab::{Snapshot, Started};
 use crate::mdp::Grid;
 
 /// A run as it is shown: its grid, its latest snapshot and its curve so far.
@@ -15,6 +16,8 @@ pub struct Shown {
     pub started: Started,
     pub snapshot: Snapshot,
     pub curve: Vec<CurvePoint>,
+    /// Another one for every snapshot there ever was on the page.
+    pub version: u64,
     grid: Grid,
 }
 
@@ -23,10 +26,10 @@ const CARD: f32 = 22.0;
 
 impl Shown {
     /// Nothing when the run's grid is no good, which a session does not let happen.
-    pub fn new(started: Started, snapshot: Snapshot, curve: Vec<CurvePoint>) -> Option<Shown> {
+    pub fn new(started: Started, snapshot: Snapshot, curve: Vec<CurvePoint>, version: u64) -> Option<Shown> {
         let given = started.setup.ensemble.as_ref().map(|ensemble| &ensemble.grid);
         let grid = Grid::new(given.unwrap_or(&started.setup.grid).clone()).ok()?;
-        Some(Shown { started, snapshot, curve, grid })
+        Some(Shown { started, snapshot, curve, version, grid })
     }
 
     /// Everything below one another, for narrow pages.
@@ -83,7 +86,7 @@ impl Shown {
     }
 
     fn show_panels(&self, ui: &mut Ui, panels: &[Panel], plan: &Plan, view: &View, pictures: &mut Pictures) -> Touched {
-        panels::show(ui, panels, plan, &self.grid, view, u64::from(self.snapshot.number), pictures)
+        panels::show(ui, panels, plan, &self.grid, view, self.version, pictures)
     }
 
     fn show_chart(&self, ui: &mut Ui, view: &View) {

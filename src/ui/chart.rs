@@ -6,7 +6,8 @@ use egui_plot::{AxisHints, Line, LineStyle, Plot, PlotPoints, log_grid_spacer};
 use super::app::View;
 use super::numbers;
 use super::theme::Palette;
-use crate::lab::{CurvePoint, RunState, Snapshot};
+use crate::experiment::CurvePoint;
+use crate::lab::{RunState, Snapshot};
 use crate::mdp::RETURN_KINDS;
 
 /// Draws the curve of a run into all the space there is.

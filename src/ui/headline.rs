@@ -15,19 +15,20 @@ struct Headline {
     ensemble: Returns,
     clone: Returns,
     optimal: Returns,
-    /// The observer of the first clone panel.
+    /// Whose clone it is.
     observer: String,
 }
 
 impl Headline {
     fn of(started: &Started, snapshot: &Snapshot, view: &View) -> Option<Headline> {
-        let observer = view.clones.first()?;
-        let clone = snapshot.clones.iter().find(|clone| clone.observer == *observer)?;
+        // Until the session has evaluated the one asked for, the run's own.
+        let asked = view.clones.first().and_then(|asked| snapshot.clones.iter().find(|clone| clone.observer == *asked));
+        let clone = asked.or(snapshot.clones.first())?;
         Some(Headline {
             ensemble: snapshot.ensemble(),
             clone: clone.view.returns,
             optimal: started.optimal.returns,
-            observer: observer.to_string(),
+            observer: clone.observer.to_string(),
         })
     }
 }
@@ -67,6 +68,7 @@ fn beta(ui: &mut Ui, app: &mut App, width: f32) {
                 .clamping(egui::SliderClamping::Never)
                 .step_by(0.01)
                 .fixed_decimals(2)
+                .update_while_editing(false)
                 .drag_value_speed(0.01);
             let response = ui.add(slider).accessible_name("β");
             let help = "Weight of the clone's failure: the experts climb J = E[ensemble] − β E[clone] (Eq. 3). \
@@ -162,15 +164,26 @@ fn sentence(app: &App) -> String {
     let Some((started, snapshot)) = app.shown() else { return String::new() };
     let Some(headline) = Headline::of(started, snapshot, &app.view) else { return String::new() };
     let n = snapshot.experts.len();
-    let experts = if n == 1 { "The expert reaches".to_owned() } else { format!("The {n} experts reach") };
-    let steps = |returns: &Returns| numbers::decimal(-returns.horizon_return, 0);
-    let success = numbers::percent(headline.clone.success);
-    let clone = if headline.clone.success < 0.9 {
-        format!("their clone ({}) gets lost: it arrives in {success} of episodes", headline.observer)
-    } else {
-        format!("their clone ({}) in {}", headline.observer, steps(&headline.clone))
+    let (experts, reach, arrive) = match n {
+        1 => ("The expert".to_owned(), "reaches", "arrives"),
+        n => (format!("The {n} experts"), "reach", "arrive"),
     };
-    format!("{experts} the goal in {} steps; {clone}.", steps(&headline.ensemble))
+    let steps = |returns: &Returns| numbers::decimal(-returns.horizon_return, 0);
+    let share = |returns: &Returns| numbers::percent(returns.success);
+    // Below this share of arrivals steps are not the story.
+    let is_lost = |returns: &Returns| returns.success < 0.9;
+    let (ensemble, clone) = (&headline.ensemble, &headline.clone);
+    let theirs = format!("{} clone ({})", if n == 1 { "its" } else { "their" }, headline.observer);
+    match (is_lost(ensemble), is_lost(clone)) {
+        (false, true) => {
+            let lost = format!("{theirs} gets lost: it arrives in {} of episodes", share(clone));
+            format!("{experts} {reach} the goal in {} steps; {lost}.", steps(ensemble))
+        }
+        (false, false) => {
+            format!("{experts} {reach} the goal in {} steps; {theirs} in {}.", steps(ensemble), steps(clone))
+        }
+        (true, _) => format!("{experts} {arrive} in {} of episodes; {theirs} in {}.", share(ensemble), share(clone)),
+    }
 }
 
 /// How far training is, in words.
@@ -178,6 +191,7 @@ fn progress(app: &App) -> String {
     let Some((_, snapshot)) = app.shown() else { return "starting".to_owned() };
     let of = format!("update {} of {}", snapshot.update, snapshot.last_update);
     match snapshot.state {
+        _ if !app.is_session_alive() => format!("stopped at {of}"),
         _ if app.is_retraining() => "retraining …".to_owned(),
         RunState::Given => "given ensemble, nothing to train".to_owned(),
         RunState::Playing => format!("training, {of}"),

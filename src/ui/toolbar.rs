@@ -64,7 +64,7 @@ fn presets(ui: &mut Ui, app: &mut App) {
 
 fn transport(ui: &mut Ui, app: &mut App) {
     let state = app.shown().map(|(_, snapshot)| snapshot.state);
-    let can_train = app.setup().ensemble.is_none() && state.is_some();
+    let can_train = app.setup().ensemble.is_none() && state.is_some() && app.is_session_alive();
     ui.add_enabled_ui(can_train, |ui| {
         ui.spacing_mut().item_spacing.x = 4.0;
         let is_playing = state == Some(RunState::Playing) || app.is_retraining();

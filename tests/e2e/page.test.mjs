@@ -147,6 +147,14 @@ test("a worker that dies leaves the page as it was", async () => {
   await close();
 });
 
+test("a program that cannot be loaded is said", async () => {
+  for (const files of ["**/app-*.js", "**/app-*.wasm"]) {
+    const { page, close } = await open(browser, site.address, { before: (page) => page.route(files, (route) => route.abort()) });
+    await page.getByText("could not be loaded").waitFor(PATIENCE);
+    await close();
+  }
+});
+
 test("without WebGL 2, WebAssembly or workers the page says what is missing", async () => {
   for (const [name, script] of [
     ["WebGL 2", () => { HTMLCanvasElement.prototype.getContext = () => null; }],

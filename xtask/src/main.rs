@@ -10,7 +10,7 @@ mod tools;
 use std::net::{Ipv4Addr, TcpListener, TcpStream};
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use steps::Steps;
 use tools::Tool;
@@ -89,32 +89,31 @@ fn serve(arguments: &[&str]) -> Result<(), Failure> {
     };
     let is_free = |port: &u16| TcpListener::bind((Ipv4Addr::LOCALHOST, *port)).is_ok();
     let port = match wanted {
-        Some(port) if is_free(&port) => port,
-        Some(port) => return Err(format!("port {port} is taken: choose another with --port")),
+        Some(port) if port > 0 && is_free(&port) => port,
+        Some(port) => return Err(format!("port {port} is not to be had: choose another with --port")),
         None => (8080..8180).find(is_free).ok_or("ports 8080 to 8179 are all taken: choose one with --port")?,
     };
     tools::install(&tools::PAGE)?;
-    steps::say("building the page (the first time about 3 minutes on two cores, then seconds)");
+    // trunk serves also what it could not build: so first build, then serve.
+    build_page()?;
     let number = port.to_string();
     let mut trunk =
         program("trunk", &["serve", TRUNK[0], TRUNK[1], "--release", "--address", "127.0.0.1", "--port", &number])
             .spawn()
             .map_err(|error| format!("trunk could not be started: {error}"))?;
-    let start = Instant::now();
     while TcpStream::connect((Ipv4Addr::LOCALHOST, port)).is_err() {
         if let Some(status) = trunk.try_wait().map_err(|error| error.to_string())? {
             return Err(format!("trunk stopped before it served the page ({status}); what it printed above says why"));
         }
         std::thread::sleep(Duration::from_millis(100));
     }
-    let seconds = start.elapsed().as_secs_f64();
-    println!("\n  ape-lab is at http://127.0.0.1:{port}/ (built in {seconds:.0} s; Ctrl-C stops it)\n");
+    println!("\n  ape-lab is at http://127.0.0.1:{port}/ (Ctrl-C stops it)\n");
     let status = trunk.wait().map_err(|error| error.to_string())?;
     if status.success() { Ok(()) } else { Err(format!("trunk ended with {status}")) }
 }
 
 fn build_page() -> Result<(), Failure> {
-    steps::say("building the page (the first time about 3 minutes on two cores)");
+    steps::say("building the page (the first time about 2 minutes on two cores, then seconds)");
     run("trunk", &["build", TRUNK[0], TRUNK[1], "--release"])
 }
 
@@ -123,12 +122,12 @@ fn build() -> Result<(), Failure> {
     tools::install(&tools::PAGE)?;
     tools::install(&[Tool::WasmOpt])?;
     build_page()?;
-    for name in wasm_files()? {
-        let file = name.to_string_lossy().into_owned();
-        steps::say(&format!("wasm-opt on {file} (about a minute)"));
-        let before = size(&name)?;
-        run("node", &["web/node_modules/binaryen/bin/wasm-opt", "-Oz", "--all-features", &file, "-o", &file])?;
-        println!("{file}: {before} bytes before, {} after", size(&name)?);
+    for file in wasm_files()? {
+        let name = file.to_string_lossy();
+        steps::say(&format!("wasm-opt on {name} (under a minute)"));
+        let before = size(&file)?;
+        run("node", &["web/node_modules/binaryen/bin/wasm-opt", "-Oz", &name, "-o", &name])?;
+        println!("{before} bytes before, {} after", size(&file)?);
     }
     println!("dist/ holds the page: any static file server can publish it");
     Ok(())
@@ -148,45 +147,44 @@ fn size(file: &Path) -> Result<u64, Failure> {
 }
 
 fn test(only: &[&str]) -> Result<(), Failure> {
-    tools::install(&tools::ALL)?;
-    let chrome = tools::chromium()?;
-    let wasm = ["--target", "wasm32-unknown-unknown"];
-    let deny = ["--", "-D", "warnings"];
+    const WASM: [&str; 2] = ["--target", "wasm32-unknown-unknown"];
+    const DENY: [&str; 3] = ["--", "-D", "warnings"];
     let mut steps = Steps::new(only);
-    steps.step("fmt", "seconds", || run("cargo", &["fmt", "--all", "--check"]));
-    steps.step("clippy", "2 minutes at first", || {
-        run("cargo", &[&["clippy", "--workspace", "--all-targets"][..], &deny].concat())
+    steps.step("fmt", "seconds", &[], || run("cargo", &["fmt", "--all", "--check"]));
+    steps.step("clippy", "2 minutes at first", &[], || {
+        run("cargo", &[&["clippy", "--workspace", "--all-targets"][..], &DENY].concat())
     });
-    steps.step("clippy-wasm", "2 minutes at first", || {
+    steps.step("clippy-wasm", "2 minutes at first", &[Tool::WasmTarget], || {
         let page = ["clippy", "--no-default-features", "--features", "page", "--tests", "--lib", "--bins"];
-        run("cargo", &[&page[..], &wasm, &deny].concat())
+        run("cargo", &[&page[..], &WASM, &DENY].concat())
     });
     // The core must stand without the page: neither egui nor the command line.
-    steps.step("core-alone", "a minute at first", || run("cargo", &["check", "--lib", "--no-default-features"]));
-    steps.step("doc", "2 minutes at first", || {
+    steps.step("core-alone", "a minute at first", &[], || run("cargo", &["check", "--lib", "--no-default-features"]));
+    steps.step("doc", "2 minutes at first", &[], || {
         let mut command = program("cargo", &["doc", "--workspace", "--no-deps", "--document-private-items"]);
         command.env("RUSTDOCFLAGS", "-D warnings");
         run_command(command)
     });
-    steps.step("native", "4 minutes at first", || run("cargo", &["test", "--workspace"]));
-    for (name, flags, file) in [
-        ("wasm-node", &["--node"][..], "wasm_node"),
-        ("wasm-chrome", &["--headless", "--chrome"], "wasm_page"),
-        ("wasm-worker", &["--headless", "--chrome"], "wasm_worker"),
-    ] {
-        steps.step(name, "3 minutes at first", || {
+    steps.step("native", "4 minutes at first", &[], || run("cargo", &["test", "--workspace"]));
+    let wasm = [Tool::WasmTarget, Tool::WasmBindgen, Tool::WasmPack];
+    let in_node = [&wasm[..], &[Tool::Node]].concat();
+    let in_chrome = [&wasm[..], &[Tool::Chromium]].concat();
+    let wasm_pack = |flags: &[&str], file: &str| {
+        let cargo = ["--", "--no-default-features", "--test", file];
+        run("wasm-pack", &[&["test", "--release"][..], flags, &cargo].concat())
+    };
+    steps.step("wasm-node", "a minute at first", &in_node, || wasm_pack(&["--node"], "wasm_node"));
+    for (name, file) in [("wasm-chrome", "wasm_page"), ("wasm-worker", "wasm_worker")] {
+        steps.step(name, "seconds", &in_chrome, || {
             let driver = tools::chromedriver()?;
-            let driver = driver.to_string_lossy();
-            let chromedriver = ["--chromedriver", &*driver];
-            let driver = if flags.len() > 1 { &chromedriver[..] } else { &[] };
-            let cargo = ["--", "--no-default-features", "--test", file];
-            run("wasm-pack", &[&["test", "--release"][..], flags, driver, &cargo].concat())
+            wasm_pack(&["--headless", "--chrome", "--chromedriver", &driver.to_string_lossy()], file)
         });
     }
-    steps.step("page", "3 minutes at first", build_page);
-    steps.step("end-to-end", "a minute", || {
-        let mut command = program("node", &["--test", "tests/e2e/"]);
-        command.env("CHROMIUM", &chrome);
+    // What is published is what is tested.
+    steps.step("page", "3 minutes at first", &[], build);
+    steps.step("end-to-end", "2 minutes", &[Tool::Chromium, Tool::Node, Tool::NodePackages], || {
+        let mut command = program("node", &["--test", "tests/e2e/page.test.mjs"]);
+        command.env("CHROMIUM", tools::chromium()?);
         run_command(command)
     });
     steps.sum_up()

@@ -4,6 +4,7 @@ use std::io::Write;
 use std::time::Instant;
 
 use crate::Failure;
+use crate::tools::{self, Tool};
 
 /// A line that says what comes next.
 pub fn say(line: &str) {
@@ -24,14 +25,21 @@ impl<'a> Steps<'a> {
         Steps { only, known: Vec::new(), done: Vec::new() }
     }
 
-    pub fn step(&mut self, name: &'static str, usual: &str, work: impl FnOnce() -> Result<(), Failure>) {
+    /// Installs what a step needs, then does it; a failure of either is the step's own.
+    pub fn step(
+        &mut self,
+        name: &'static str,
+        usual: &str,
+        needs: &[Tool],
+        work: impl FnOnce() -> Result<(), Failure>,
+    ) {
         self.known.push(name);
         if !self.only.is_empty() && !self.only.contains(&name) {
             return;
         }
         say(&format!("{name} (usually {usual})"));
         let start = Instant::now();
-        let outcome = work();
+        let outcome = tools::install(needs).and_then(|()| work());
         if let Err(sentence) = &outcome {
             println!("{sentence}");
         }

@@ -42,7 +42,7 @@ pub fn install(tools: &[Tool]) -> Result<(), Failure> {
         Tool::WasmBindgen => {
             cargo_program("wasm-bindgen-cli", "wasm-bindgen", &locked_wasm_bindgen()?, false, "2 minutes")
         }
-        Tool::WasmPack => cargo_program("wasm-pack", "wasm-pack", WASM_PACK, true, "3 minutes"),
+        Tool::WasmPack => cargo_program("wasm-pack", "wasm-pack", WASM_PACK, true, "1 minute"),
         Tool::WasmOpt => {
             node()?;
             npm_ci("web")
@@ -142,10 +142,8 @@ fn is_root() -> bool {
 fn apt(packages: &[&str], why: &str) -> Result<(), Failure> {
     let by_hand = format!("{why}; by hand: apt-get install {}", packages.join(" "));
     if find("apt-get").is_none() {
-        return Err(format!(
-            "{why}, and this system has no apt-get: install {} the way your system does",
-            packages.join(" and ")
-        ));
+        let packages = packages.join(" and ");
+        return Err(format!("{why}, and this system has no apt-get: install {packages} the way your system does"));
     }
     say(&format!("installing {} with apt-get (about 15 seconds)", packages.join(", ")));
     let apt = |arguments: &[&str]| {
@@ -161,16 +159,28 @@ fn apt(packages: &[&str], why: &str) -> Result<(), Failure> {
     apt(&[&["install", "-y", "-qq", "--no-install-recommends"], packages].concat())
 }
 
-const CHROMIUM: [&str; 4] = ["chromium", "chromium-browser", "google-chrome", "google-chrome-stable"];
+/// Names and places of Chromium and Chrome.
+const CHROMIUM: [&str; 5] = [
+    "chromium",
+    "chromium-browser",
+    "google-chrome",
+    "google-chrome-stable",
+    "/Applications/Google Chrome.app/Contents/MacOS/Google Chrome",
+];
 
-/// A Chromium or Chrome on PATH.
+/// The program that an environment variable names, or else the first of `names` that is there.
+fn named_or_found(variable: &str, names: &[&str]) -> Result<PathBuf, Failure> {
+    let named = std::env::var_os(variable).map(PathBuf::from);
+    let found = || names.iter().find_map(|name| find(name));
+    named.or_else(found).ok_or_else(|| format!("{} is missing; the variable {variable} can name it", names[0]))
+}
+
 pub fn chromium() -> Result<PathBuf, Failure> {
-    let found = CHROMIUM.iter().find_map(|name| find(name));
-    found.ok_or_else(|| "Chromium is missing although it was just looked for".to_owned())
+    named_or_found("CHROMIUM", &CHROMIUM)
 }
 
 pub fn chromedriver() -> Result<PathBuf, Failure> {
-    find("chromedriver").ok_or_else(|| "chromedriver is missing although it was just looked for".to_owned())
+    named_or_found("CHROMEDRIVER", &["chromedriver"])
 }
 
 fn chromium_and_driver() -> Result<(), Failure> {
@@ -198,6 +208,6 @@ fn npm_ci(folder: &str) -> Result<(), Failure> {
     }
     say(&format!("installing the node packages of {} (seconds)", folder.display()));
     let mut command = Command::new("npm");
-    command.args(["ci", "--no-audit", "--no-fund", "--silent"]).current_dir(&folder).env("PATH", path());
+    command.args(["ci", "--no-audit", "--no-fund", "--loglevel=error"]).current_dir(&folder).env("PATH", path());
     run_command(command)
 }
