@@ -1,7 +1,7 @@
 //! The chart: returns of ensemble and clone over training, and what PG-APE climbs.
 
 use egui::{Color32, Label, Rangef, RichText, TextStyle, Ui};
-use egui_plot::{AxisHints, Line, LineStyle, Plot, PlotPoints, log_grid_spacer};
+use egui_plot::{AxisHints, GridInput, Line, LineStyle, Plot, PlotPoints, uniform_grid_spacer};
 
 use super::app::View;
 use super::numbers;
@@ -62,7 +62,8 @@ pub fn show(ui: &mut Ui, curve: &[CurvePoint], snapshot: &Snapshot, observer: &s
         .include_y(0.0)
         .include_y(if kind.is_steps { 0.0 } else { 1.0 })
         .grid_color(palette.line)
-        .y_grid_spacer(log_grid_spacer(5))
+        .x_grid_spacer(uniform_grid_spacer(ticks))
+        .y_grid_spacer(uniform_grid_spacer(ticks))
         .custom_x_axes(vec![
             axis(AxisHints::new_x())
                 .label_spacing(Rangef::new(20.0, 36.0))
@@ -80,6 +81,15 @@ pub fn show(ui: &mut Ui, curve: &[CurvePoint], snapshot: &Snapshot, observer: &s
             egui_plot::HoverPosition::Elsewhere { .. } => None,
         })
         .show(ui, |plot| lines.into_iter().flatten().for_each(|line| plot.line(line)));
+}
+
+/// Distances of grid lines: 1, 2 or 5 times a power of ten, some eight of them over an axis.
+fn ticks(input: GridInput) -> [f64; 3] {
+    let least = (input.bounds.1 - input.bounds.0).max(f64::MIN_POSITIVE) / 8.0;
+    let power = libm::pow(10.0, libm::floor(libm::log10(least)));
+    let step = [1.0, 2.0, 5.0, 10.0].map(|times| times * power).into_iter().find(|&step| step >= least);
+    let step = step.unwrap_or(10.0 * power);
+    [step, 10.0 * step, 100.0 * step]
 }
 
 fn axis_label(value: f64, is_steps: bool) -> String {

@@ -61,7 +61,7 @@ pub fn show(ui: &mut Ui, app: &mut App) {
     ui.add_space(6.0);
     CollapsingHeader::new("Advanced").show(ui, |ui| {
         let text =
-            "Every other field of the configuration. Where it differs from the paper, the paper's value stands below.";
+            "Every other field of the configuration. Where it differs from the paper, the paper's value stands beside it.";
         ui.label(RichText::new(text).small().color(Palette::of(ui).muted));
         for field in FIELDS.iter().filter(|field| !ELSEWHERE.contains(&field.name)) {
             show_field(ui, field, &mut config);
@@ -83,7 +83,7 @@ fn show_field(ui: &mut Ui, field: &Field, config: &mut Config) {
     let palette = Palette::of(ui);
     ui.add_space(2.0);
     ui.label(RichText::new(field.label).small());
-    ui.horizontal(|ui| {
+    ui.horizontal_wrapped(|ui| {
         let tip = format!("{} Expected: {}.", field.help, field.expected());
         match &field.kind {
             Kind::Real { low, high, get, set } => {
@@ -124,8 +124,9 @@ fn show_field(ui: &mut Ui, field: &Field, config: &mut Config) {
         if let Some(value) = field.paper {
             let mut paper = Config::default();
             let is_papers = field.set(&mut paper, value).is_ok() && field.text(&paper) == field.text(config);
-            let mark = if is_papers { "as in the paper".to_owned() } else { format!("paper: {value}") };
-            ui.label(RichText::new(mark).small().color(if is_papers { palette.muted } else { palette.warning }));
+            let mark = if is_papers { "as paper".to_owned() } else { format!("paper: {value}") };
+            let mark = RichText::new(mark).small().color(if is_papers { palette.muted } else { palette.warning });
+            ui.add(egui::Label::new(mark).extend());
         }
     });
 }
