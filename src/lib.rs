@@ -6,8 +6,8 @@
 //! - [`ape`]: ensembles, their files and figures, who an observer takes the actor to be, and PG-APE.
 //! - [`experiment`]: what a run starts from, the presets, and the course of a run.
 //! - [`lab`]: a training session as a state machine with messages in and out, and a thread to run it.
-//! - [`ui`]: the page, in egui and nothing else.
-//! - [`web`]: what only a browser has: the worker, the mirror of the page for assistive technology.
+//! - `ui`: the page, in egui and nothing else.
+//! - `web`: what only a browser has: the worker, the mirror of the page for assistive technology.
 //!
 //! The programs in `src/bin` are thin: `app` (the page, or a window), `worker` (the browser's worker) and
 //! `ape` (the command line).

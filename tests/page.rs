@@ -168,6 +168,24 @@ fn an_honest_observer_undoes_the_protection() {
 }
 
 #[test]
+fn the_replay_observer_takes_a_number() {
+    let (mut page, here) = open(1280.0, 800.0);
+    page.get_by_label_contains("replay: remembers recent demonstrations").click_accesskit();
+    settle(&mut page);
+    page.get_by_role_and_label(Role::SpinButton, "contexts kept at each cell").set_value_accesskit(7.0);
+    settle(&mut page);
+    let desk = here.0.borrow();
+    let loaded = desk.commands.iter().rev().find_map(|command| match command {
+        Command::Load { setup, .. } => Some(setup.config.observer.to_string()),
+        _ => None,
+    });
+    assert_eq!(loaded.as_deref(), Some("replay(7)"));
+    page.get_by(|node| {
+        node.role() == Role::Image && says(node).is_some_and(|text| text.starts_with("Clone (replay(7))"))
+    });
+}
+
+#[test]
 fn every_return_can_be_chosen() {
     let (mut page, _) = open(1280.0, 800.0);
     for (label, figure_name) in [("uncapped", "uncapped"), ("within T", "within T"), ("capped", "capped")] {

@@ -4,7 +4,7 @@
 //!
 //! J(θ) = E_{τ ~ π_c}[r(τ)] − β E_{τ ~ π_o}[r(τ)]                                   (paper, Eq. 3)
 //!
-//! once with Adam. Experts are tables of logits, θ[c][s][a]. As they are tables, the gradient needs nothing
+//! once with Adam. Experts are tables of logits, `θ[c][s][a]`. As they are tables, the gradient needs nothing
 //! of a batch but how often each (context, state, action) was taken and the sum of the returns that followed:
 //! [`Tally`] is all that playing writes.
 

@@ -4,7 +4,7 @@ use rand::{Rng, RngExt};
 
 use super::{ACTIONS, Grid};
 
-/// Draws one of up to [`Draw::MAX`] outcomes with given probabilities, without a branch.
+/// Draws one of up to `OUTCOMES` outcomes with given probabilities, without a branch.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Draw<const OUTCOMES: usize> {
     /// Upper ends of all outcomes' intervals on 0..2³¹; 31 bits, so that probability 1 has one too and an

@@ -6,7 +6,7 @@ use super::board::Shown;
 use super::heatmap::Pictures;
 use super::panels::Touched;
 use super::theme::{self, GAP, NARROW, Palette, SPACE, WIDE};
-use super::{controls, headline, help, toolbar};
+use super::{controls, focus, headline, help, toolbar};
 use crate::ape::Config;
 use crate::ape::observer::ObserverChoice;
 use crate::experiment::{PRESETS, Setup};
@@ -33,6 +33,8 @@ pub struct View {
     /// The cell marked in every panel.
     pub cell: Option<usize>,
     pub is_help_open: bool,
+    /// Whether the page was last used by keyboard.
+    pub is_by_keyboard: bool,
 }
 
 /// The session at the other end of the link, as far as the page knows.
@@ -84,6 +86,7 @@ impl App {
                 speed: 5,
                 cell: None,
                 is_help_open: false,
+                is_by_keyboard: false,
             },
             pictures: Pictures::default(),
             taken: 0,
@@ -272,6 +275,7 @@ impl App {
             CentralPanel::no_frame().frame(rest).show(ui, |ui| self.show_board(ui, Shown::show_planned));
         }
         self.show_help(ui);
+        focus::show(ui, &mut self.view.is_by_keyboard);
     }
 
     fn show_top(&mut self, ui: &mut Ui) {

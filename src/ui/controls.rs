@@ -29,6 +29,16 @@ pub fn show(ui: &mut Ui, app: &mut App) {
             config.observer = choice;
         }
     }
+    if let Some(range) = &config.observer.model().parameter {
+        ui.horizontal(|ui| {
+            let mut value = config.observer.parameter();
+            let drag = DragValue::new(&mut value).range(range.low..=range.high).speed(0.3).update_while_editing(false);
+            let paper = Field::find("observer").and_then(|field| field.paper).unwrap_or_default();
+            ui.add(drag).accessible_name(range.meaning).on_hover_text(format!("Paper: {paper}."));
+            ui.label(RichText::new(range.meaning).small().color(Palette::of(ui).muted));
+            config.observer = config.observer.with_parameter(value);
+        });
+    }
     section(ui, "Experts");
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing.x = 2.0;

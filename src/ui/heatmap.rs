@@ -61,10 +61,6 @@ impl Heatmap<'_> {
             ui.painter().rect_stroke(mark, 2.0, Stroke::new(4.0, Color32::BLACK), StrokeKind::Outside);
             ui.painter().rect_stroke(mark, 2.0, Stroke::new(2.0, Color32::WHITE), StrokeKind::Outside);
         }
-        if response.has_focus() {
-            let stroke = Stroke::new(2.0, Palette::of(ui).accent);
-            ui.painter().rect_stroke(rect.expand(3.0), 3.0, stroke, StrokeKind::Outside);
-        }
         let pointed = response.hover_pos().or(response.interact_pointer_pos()).filter(|at| rect.contains(*at));
         pointed.map(|at| {
             let place = (at - rect.min) / cell;

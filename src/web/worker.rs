@@ -15,8 +15,13 @@ pub struct WorkerLink {
     wake: Rc<dyn Fn()>,
     inbox: Rc<RefCell<VecDeque<Result<Event, String>>>>,
     worker: Option<Worker>,
-    /// Kept as long as the worker may call them.
-    handlers: Option<(Closure<dyn Fn(MessageEvent)>, Closure<dyn Fn(ErrorEvent)>)>,
+    handlers: Option<Handlers>,
+}
+
+/// What a worker calls; kept as long as it may.
+struct Handlers {
+    _on_message: Closure<dyn Fn(MessageEvent)>,
+    _on_error: Closure<dyn Fn(ErrorEvent)>,
 }
 
 impl WorkerLink {
@@ -81,7 +86,7 @@ impl Link for WorkerLink {
         });
         worker.set_onmessage(Some(on_message.as_ref().unchecked_ref()));
         worker.set_onerror(Some(on_error.as_ref().unchecked_ref()));
-        self.handlers = Some((on_message, on_error));
+        self.handlers = Some(Handlers { _on_message: on_message, _on_error: on_error });
         self.worker = Some(worker);
     }
 }

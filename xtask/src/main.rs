@@ -69,7 +69,8 @@ pub fn run(name: &str, arguments: &[&str]) -> Result<(), Failure> {
 }
 
 pub fn run_command(mut command: Command) -> Result<(), Failure> {
-    let shown = format!("{command:?}").replace('"', "");
+    let words = std::iter::once(command.get_program()).chain(command.get_args());
+    let shown = words.map(|word| word.to_string_lossy()).collect::<Vec<_>>().join(" ");
     match command.status() {
         Ok(status) if status.success() => Ok(()),
         Ok(status) => Err(format!("`{shown}` ended with {status}")),

@@ -77,6 +77,19 @@ impl ObserverChoice {
         &OBSERVERS[self.index as usize]
     }
 
+    /// The number in parentheses; 0 for a model that takes none.
+    pub fn parameter(&self) -> u32 {
+        self.parameter
+    }
+
+    /// The same model with another number, brought into its range; the same choice for a model without one.
+    pub fn with_parameter(self, parameter: u32) -> ObserverChoice {
+        match &self.model().parameter {
+            Some(range) => ObserverChoice { parameter: parameter.clamp(range.low, range.high), ..self },
+            None => self,
+        }
+    }
+
     pub fn build(&self, grid: &Grid, experts: usize) -> Box<dyn Observer> {
         (self.model().build)(grid, experts, self.parameter)
     }
