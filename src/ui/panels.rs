@@ -164,7 +164,6 @@ fn show_title(ui: &mut Ui, panel: &Panel, height: f32, view: &View, touched: &mu
             let side = ui.spacing().interact_size.y;
             let width = ui.available_width() - button.map_or(0.0, |_| side + 4.0);
             choose_observer(ui, index, width, view, touched);
-            ui.spacing_mut().interact_size.y = side;
             match button {
                 Some(Icon::Add) if icon_button(ui, Icon::Add, "Show a second clone beside it", false).clicked() => {
                     let other = ObserverChoice::all().find(|choice| !view.clones.contains(choice));
