@@ -223,8 +223,11 @@ impl Session {
         if let Some(run) = &self.run {
             let has_ended = run.is_silent && !run.is_playing;
             if has_ended && self.next_beta.is_some() {
-                // The newest β is wanted; what was trained is shown all the same, for the eye to follow.
-                self.snapshot(clock);
+                // The newest β is wanted; what was trained is shown all the same, for the eye to follow, as long
+                // as the page keeps up.
+                if self.in_flight.len() < IN_FLIGHT {
+                    self.snapshot(clock);
+                }
                 if let Err(sentence) = self.begin_queued() {
                     self.outbox.push(Event::Refused(sentence));
                 }
