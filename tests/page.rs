@@ -68,7 +68,10 @@ fn open<'a>(width: f32, height: f32) -> (Page<'a>, Here) {
     let mut page = Harness::builder().with_size(egui::vec2(width, height)).build_ui_state(
         move |ui, app: &mut Option<App>| {
             match app {
-                Some(app) => app.show(ui),
+                Some(app) => {
+                    app.hear();
+                    app.show(ui);
+                }
                 // Fonts and styles hold from the next frame on.
                 None => *app = Some(App::new(ui.ctx(), Box::new(link.clone()))),
             }

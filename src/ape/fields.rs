@@ -49,8 +49,15 @@ pub struct ConfigError {
 }
 
 impl Field {
-    pub fn find(name: &str) -> Option<&'static Field> {
-        FIELDS.iter().find(|field| field.name == name)
+    /// The field of this name, which must be in the table.
+    pub fn named(name: &str) -> &'static Field {
+        FIELDS.iter().find(|field| field.name == name).expect("asked for by a name in the table")
+    }
+
+    /// What it is, and the paper's value.
+    pub fn tip(&self) -> String {
+        let paper = self.paper.map(|value| format!(" Paper: {value}.")).unwrap_or_default();
+        format!("{}{paper}", self.help)
     }
 
     /// What a value must be.
@@ -267,7 +274,7 @@ mod tests {
 
     #[test]
     fn text_that_is_no_value_is_refused() {
-        let set = |name: &str, text: &str| Field::find(name).unwrap().set(&mut Config::default(), text);
+        let set = |name: &str, text: &str| Field::named(name).set(&mut Config::default(), text);
         assert_eq!(set("beta", "x").unwrap_err().to_string(), "beta x: must be a number from 0 to 2");
         assert_eq!(set("experts", "2.5").unwrap_err().to_string(), "experts 2.5: must be a whole number from 1 to 8");
         assert!(set("beta", "NaN").is_err() && set("observer", "nobody").is_err() && set("gradient", "").is_err());

@@ -53,10 +53,9 @@ fn command() -> Command {
         .arg(file("out", "Write the ensemble to this file"))
         .arg(file("curve", "Write the figures after every update to this CSV file"));
     for field in &FIELDS {
-        let paper = field.paper.map(|value| format!(" Paper: {value}.")).unwrap_or_default();
-        let help = format!("{}{paper}", field.help);
         let flag = field.name.replace('_', "-");
-        train = train.arg(Arg::new(field.name).long(flag).value_name("VALUE").allow_hyphen_values(true).help(help));
+        let argument = Arg::new(field.name).long(flag).value_name("VALUE").allow_hyphen_values(true);
+        train = train.arg(argument.help(field.tip()));
     }
     Command::new("ape")
         .about("Adversarial policy ensembles: train them, evaluate them")

@@ -149,7 +149,10 @@ impl App {
         if beta != self.setup.config.beta {
             self.setup.config.beta = beta;
             self.preset = None;
-            self.send(headline::beta_command(self.view.beta_mode, beta));
+            self.send(match self.view.beta_mode {
+                BetaMode::Retrain => Command::Retrain { beta },
+                BetaMode::Continue => Command::Continue { beta },
+            });
         }
     }
 
@@ -170,8 +173,8 @@ impl App {
         self.send(Command::Show(self.view.clones.clone()));
     }
 
-    /// Takes in what the session has said.
-    fn hear(&mut self) {
+    /// Takes in what the session has said; to be called also while nothing is drawn.
+    pub fn hear(&mut self) {
         while let Some(event) = self.link.receive() {
             match event {
                 Ok(Event::Ready { protocol }) if protocol == PROTOCOL => {
@@ -221,9 +224,8 @@ impl eframe::App for App {
 }
 
 impl App {
-    /// Takes in what has been heard, draws the page, and says what has been drawn.
+    /// Draws the page, and says what has been drawn.
     pub fn show(&mut self, ui: &mut Ui) {
-        self.hear();
         self.draw(ui);
         if let Some(number) = self.undrawn.take() {
             self.send(Command::Seen(number));

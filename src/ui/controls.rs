@@ -33,8 +33,7 @@ pub fn show(ui: &mut Ui, app: &mut App) {
         ui.horizontal(|ui| {
             let mut value = config.observer.parameter();
             let drag = DragValue::new(&mut value).range(range.low..=range.high).speed(0.3).update_while_editing(false);
-            let paper = Field::find("observer").and_then(|field| field.paper).unwrap_or_default();
-            ui.add(drag).accessible_name(range.meaning).on_hover_text(format!("Paper: {paper}."));
+            ui.add(drag).accessible_name(range.meaning).on_hover_text(Field::named("observer").tip());
             ui.label(RichText::new(range.meaning).small().color(Palette::of(ui).muted));
             config.observer = config.observer.with_parameter(value);
         });
@@ -51,7 +50,7 @@ pub fn show(ui: &mut Ui, app: &mut App) {
                 let name = if n == 1 { "1 expert".to_owned() } else { format!("{n} experts") };
                 egui::WidgetInfo::selected(egui::Role::RadioButton, true, config.experts == n, name)
             });
-            if response.on_hover_text(help("experts")).clicked() {
+            if response.on_hover_text(Field::named("experts").tip()).clicked() {
                 config.experts = n;
             }
         }
@@ -59,7 +58,7 @@ pub fn show(ui: &mut Ui, app: &mut App) {
     section(ui, "Seed");
     ui.horizontal(|ui| {
         let drag = DragValue::new(&mut config.seed).speed(0.2).update_while_editing(false);
-        ui.add(drag).accessible_name("Seed").on_hover_text(help("seed"));
+        ui.add(drag).accessible_name("Seed").on_hover_text(Field::named("seed").tip());
         if icon_button(ui, Icon::Dice, "Next seed", false).clicked() {
             config.seed = config.seed.wrapping_add(1);
         }
@@ -83,10 +82,6 @@ pub fn show(ui: &mut Ui, app: &mut App) {
     if config != app.setup().config {
         app.reconfigure(config);
     }
-}
-
-fn help(name: &str) -> &'static str {
-    Field::find(name).map_or("", |field| field.help)
 }
 
 fn show_field(ui: &mut Ui, field: &Field, config: &mut Config) {

@@ -6,8 +6,8 @@ use super::app::{App, BetaMode, View};
 use super::numbers;
 use super::theme::{self, Palette, SPACE};
 use super::widgets::{choose, spoken};
-use crate::ape::Config;
-use crate::lab::{Command, RunState, Snapshot, Started};
+use crate::ape::{Config, Field};
+use crate::lab::{RunState, Snapshot, Started};
 use crate::mdp::{RETURN_KINDS, Returns};
 
 /// The figures that the headline is about.
@@ -70,23 +70,18 @@ fn beta(ui: &mut Ui, app: &mut App, width: f32) {
                 .fixed_decimals(2)
                 .update_while_editing(false)
                 .drag_value_speed(0.01);
-            let response = ui.add(slider).accessible_name("β");
-            let help = "Weight of the clone's failure: the experts climb J = E[ensemble] − β E[clone] (Eq. 3). \
-                        At 0 they care only about the goal; the paper's value is 0.6.";
-            if response.on_hover_text(help).changed() {
+            let response = ui.add(slider).accessible_name("β").on_hover_text(Field::named("beta").tip());
+            if response.changed() {
                 app.set_beta(beta.clamp(0.0, Config::MAX_BETA));
             }
         });
         ui.horizontal(|ui| {
-            let mut mode = app.view.beta_mode;
             let options = [
                 (BetaMode::Retrain, "retrain", "Every new β trains a whole run from the seed"),
                 (BetaMode::Continue, "continue", "The training under way goes on with the new β"),
             ];
             ui.label(RichText::new("moving β:").small().color(palette.muted));
-            if choose(ui, "Moving β", &mut mode, &options) {
-                app.view.beta_mode = mode;
-            }
+            choose(ui, "Moving β", &mut app.view.beta_mode, &options);
         });
     });
 }
@@ -202,12 +197,4 @@ fn progress(app: &App) -> String {
 
 fn seconds(milliseconds: f64) -> String {
     if milliseconds < 1000.0 { format!("{milliseconds:.0} ms") } else { format!("{:.1} s", milliseconds / 1000.0) }
-}
-
-/// Sends what a changed β asks for.
-pub fn beta_command(mode: BetaMode, beta: f64) -> Command {
-    match mode {
-        BetaMode::Retrain => Command::Retrain { beta },
-        BetaMode::Continue => Command::Continue { beta },
-    }
 }

@@ -113,9 +113,8 @@ pub fn section(ui: &mut Ui, title: &str) {
     ui.label(egui::RichText::new(title).text_style(theme::strong()));
 }
 
-/// A row of words of which one is chosen. Returns whether the choice changed.
-pub fn choose<T: PartialEq + Copy>(ui: &mut Ui, name: &str, chosen: &mut T, options: &[(T, &str, &str)]) -> bool {
-    let before = *chosen;
+/// A row of words of which one is chosen.
+pub fn choose<T: PartialEq + Copy>(ui: &mut Ui, name: &str, chosen: &mut T, options: &[(T, &str, &str)]) {
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = 2.0;
         ui.spacing_mut().button_padding.x = 9.0;
@@ -129,7 +128,6 @@ pub fn choose<T: PartialEq + Copy>(ui: &mut Ui, name: &str, chosen: &mut T, opti
             }
         }
     });
-    *chosen != before
 }
 
 /// A label whose words for assistive technology say more than its looks do.
