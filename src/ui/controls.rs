@@ -41,11 +41,12 @@ pub fn show(ui: &mut Ui, app: &mut App) {
     section(ui, "Experts");
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing.x = 2.0;
-        ui.spacing_mut().button_padding.x = 8.0;
-        ui.spacing_mut().interact_size.x = 0.0;
+        ui.spacing_mut().button_padding.x = 2.0;
+        // All in one row, and wide enough for a finger where there is room.
+        let width = ((ui.available_width() - 2.0 * 7.0) / Config::MAX_EXPERTS as f32).floor().min(40.0);
         for n in 1..=Config::MAX_EXPERTS {
             let button = egui::Button::selectable(config.experts == n, n.to_string()).frame_when_inactive(true);
-            let response = ui.add(button);
+            let response = ui.add(button.min_size(egui::vec2(width, 0.0)));
             response.widget_info(|| {
                 let name = if n == 1 { "1 expert".to_owned() } else { format!("{n} experts") };
                 egui::WidgetInfo::selected(egui::Role::RadioButton, true, config.experts == n, name)
