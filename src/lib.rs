@@ -4,6 +4,7 @@
 //!
 //! - [`mdp`]: gridworlds, stationary policies, their exact returns. Knows nothing of ensembles.
 //! - [`ape`]: ensembles, their files and figures, who an observer takes the actor to be, and PG-APE.
+//! - [`attack`]: the cloners, from behaviour cloning to a recurrent network, and what their clones return.
 //! - [`experiment`]: what a run starts from, the presets, and the course of a run.
 //! - [`lab`]: a training session as a state machine with messages in and out, and a thread to run it.
 //! - `ui`: the page, in egui and nothing else.
@@ -13,6 +14,7 @@
 //! `ape` (the command line).
 
 pub mod ape;
+pub mod attack;
 pub mod experiment;
 pub mod lab;
 pub mod mdp;

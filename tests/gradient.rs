@@ -1,7 +1,7 @@
 #![cfg(not(target_arch = "wasm32"))]
 //! The gradient estimators against finite differences of the exact objective, p(c|s) held fixed.
 
-use ape_lab::ape::{BaselineKind, Config, Contexts, Ensemble, GradientKind, ReturnToGo, Trainer};
+use ape_lab::ape::{Algorithm, BaselineKind, Config, Contexts, Ensemble, GradientKind, PgApe, ReturnToGo};
 use ape_lab::mdp::{ACTIONS, Grid, GridSpec, Policy};
 
 /// Exact E[Σ γᵗ r] over at most T steps, from a uniformly drawn start.
@@ -40,7 +40,7 @@ fn check(config: Config) {
     const ESTIMATES: usize = 300;
     let spec = GridSpec { rows: 3, cols: 2, goal: (0, 0), walls: vec![(0, 1)], slip: 0.1 };
     let grid = Grid::new(spec).unwrap();
-    let mut trainer = Trainer::new(grid.clone(), config.clone()).unwrap();
+    let mut trainer = PgApe::new(grid.clone(), config.clone());
     // Some training first: away from uniform policies and zero baselines.
     for _ in 0..25 {
         trainer.update();

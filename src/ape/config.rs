@@ -2,8 +2,20 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::AdversaryReward;
 use super::fields::{ConfigError, FIELDS};
 use super::observer::ObserverChoice;
+use crate::mdp::Grid;
+
+/// How J is climbed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum AlgorithmKind {
+    /// The paper's Algorithm 1: policy gradient from sampled episodes.
+    PgApe,
+    /// Exact gradients of J over T steps, nothing sampled. Ours.
+    Exact,
+}
 
 /// How the clone's trajectories push the experts (paper, appendix "Estimating ∇ log π_o").
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -43,6 +55,8 @@ pub struct Config {
     pub experts: u32,
     /// β, weight of the clone's return in the objective, 0..=2 (paper: 0.6).
     pub beta: f64,
+    /// How J is climbed (paper: `pg_ape`).
+    pub algorithm: AlgorithmKind,
     /// Who the clone is thought to be: `p(c|s)` (paper: `replay(60)`).
     pub observer: ObserverChoice,
     /// Estimator of the clone's gradient (paper: `sampled_context`).
@@ -67,6 +81,13 @@ pub struct Config {
     pub batch_steps: u32,
     /// Steps of τ₁ in a whole run; divided by `batch_steps` it gives the updates (paper: 3,000,000).
     pub total_steps: u32,
+    /// Updates in a whole run of exact APE, which has no steps to count (paper: none).
+    pub exact_updates: u32,
+    /// r̃, what the clone is to be denied instead of the experts' reward (paper: none).
+    pub adversary_reward: Option<AdversaryReward>,
+    /// α of Eq. 2, as a return within T: β then follows so that the ensemble's return stays at least this
+    /// (paper: none).
+    pub alpha: Option<f64>,
     /// Everything random comes from it.
     pub seed: u32,
 }
@@ -76,6 +97,7 @@ impl Default for Config {
         Config {
             experts: 2,
             beta: 0.6,
+            algorithm: AlgorithmKind::PgApe,
             observer: ObserverChoice::UNIFORM,
             gradient: GradientKind::SampledContext,
             learning_rate: 0.05,
@@ -88,6 +110,9 @@ impl Default for Config {
             horizon: 100,
             batch_steps: 4096,
             total_steps: 3_000_000,
+            exact_updates: 1500,
+            adversary_reward: None,
+            alpha: None,
             seed: 1,
         }
     }
@@ -105,12 +130,44 @@ impl Config {
 
     /// Number of updates of a whole run (paper: 732).
     pub fn updates(&self) -> u32 {
-        (self.total_steps / self.batch_steps).max(1)
+        match self.algorithm {
+            AlgorithmKind::PgApe => (self.total_steps / self.batch_steps).max(1),
+            AlgorithmKind::Exact => self.exact_updates,
+        }
     }
 
-    /// Checks every range.
+    /// Weight of the entropy bonus after so many updates: linear from start to end, then as at the end.
+    pub fn entropy_weight(&self, updates: u32) -> f64 {
+        let last = (self.updates() - 1).max(1);
+        self.entropy_start + (self.entropy_end - self.entropy_start) * f64::from(updates.min(last)) / f64::from(last)
+    }
+
+    /// Checks every range, and that the fields go together.
     pub fn check(&self) -> Result<(), ConfigError> {
-        FIELDS.iter().try_for_each(|field| field.check(self))
+        FIELDS.iter().try_for_each(|field| field.check(self))?;
+        let observer = |expected: &str| {
+            Err(ConfigError { field: "observer", value: self.observer.to_string(), expected: expected.to_owned() })
+        };
+        let has_formula = [ObserverChoice::UNIFORM, ObserverChoice::OCCUPANCY].contains(&self.observer);
+        if self.algorithm == AlgorithmKind::Exact && !has_formula {
+            return observer("uniform or occupancy with the algorithm exact, which needs a formula for p(c|s)");
+        }
+        if self.gradient == GradientKind::Mixture && self.observer.model().remembers {
+            return observer("one without a memory with the gradient mixture, which needs a p(c|s)");
+        }
+        Ok(())
+    }
+
+    /// Checks what depends on the grid.
+    pub fn check_on(&self, grid: &Grid) -> Result<(), ConfigError> {
+        match self.adversary_reward.as_ref().and_then(|reward| reward.outside(grid)) {
+            None => Ok(()),
+            Some((row, col)) => Err(ConfigError {
+                field: "adversary_reward",
+                value: format!("{row},{col}"),
+                expected: format!("a cell of the grid of {} × {} cells", grid.rows(), grid.cols()),
+            }),
+        }
     }
 }
 

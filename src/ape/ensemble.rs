@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::Config;
-use crate::mdp::{ACTIONS, Grid, GridError, GridSpec, Policy, PolicyError, Returns, Solver};
+use crate::mdp::{ACTIONS, Grid, GridError, GridSpec, Policy, PolicyError, Returns, Solver, Value};
 
 /// n experts; one of them, drawn uniformly, acts for a whole episode.
 #[derive(Clone, Debug, PartialEq)]
@@ -31,6 +31,20 @@ impl Ensemble {
         self.policies.iter().map(|policy| solver.evaluate(policy, horizon).returns).collect()
     }
 
+    /// Hitting times and returns of whoever plays episodes with the ensemble's law: from each cell the mean of
+    /// the experts' steps.
+    pub fn law(&self, solver: &mut Solver, horizon: u32) -> Value {
+        let values: Vec<Value> = self.policies.iter().map(|policy| solver.evaluate(policy, horizon)).collect();
+        let n = values.len() as f64;
+        let hitting_time: Vec<f64> = (0..self.policies[0].rows().len())
+            .map(|state| values.iter().map(|value| value.hitting_time[state]).sum::<f64>() / n)
+            .collect();
+        let mean = Returns::mean(&values.iter().map(|value| value.returns).collect::<Vec<_>>());
+        // Cut after the mean is taken, not before.
+        let capped_return = solver.capped_return(&hitting_time);
+        Value { hitting_time, returns: Returns { capped_return, ..mean } }
+    }
+
     /// π_o(a|s) = Σ_c p(c|s) π_c(a|s) (paper, Eq. 1): what an observer ends up with.
     pub fn cloned(&self, contexts: &Contexts) -> Policy {
         let row = |state: usize| {
@@ -47,7 +61,7 @@ impl Ensemble {
 }
 
 /// p(c|s): for every cell, the probability of each expert to have acted there.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Contexts {
     experts: usize,
     /// `[S][n]`.
@@ -106,6 +120,8 @@ pub enum EnsembleError {
         "not an ensemble file: {0}; expected {{\"format\": \"ape-ensemble\", \"version\": 1, \"grid\": …, \"experts\": …}}"
     )]
     Json(String),
+    #[error("not an ensemble file: longer than {} MB", EnsembleFile::LONGEST / 1_000_000)]
+    Long,
     #[error("format {0:?}: must be \"ape-ensemble\"")]
     Format(String),
     #[error("version {0}: this program reads version 1")]
@@ -131,9 +147,15 @@ impl EnsembleFile {
         }
     }
 
+    /// Longest text of a file, in bytes: the largest ensemble there can be takes a tenth of it.
+    pub const LONGEST: usize = 10_000_000;
+
     /// Reads the JSON text of a file; [`EnsembleFile::check`] then says whether it makes sense. A `config` that
     /// is not ours is left out: it does not change what the ensemble is.
     pub fn parse(text: &str) -> Result<EnsembleFile, EnsembleError> {
+        if text.len() > Self::LONGEST {
+            return Err(EnsembleError::Long);
+        }
         let json = |error: serde_json::Error| EnsembleError::Json(error.to_string());
         let mut value: serde_json::Value = serde_json::from_str(text).map_err(json)?;
         let config = value.as_object_mut().and_then(|fields| fields.remove("config"));

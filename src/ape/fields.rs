@@ -3,7 +3,7 @@
 //! Checking, the command line's flags and the page's controls all read it.
 
 use super::observer::{OBSERVERS, ObserverChoice};
-use super::{BaselineKind, Config, GradientKind, ReturnToGo};
+use super::{AdversaryReward, AlgorithmKind, BaselineKind, Config, GradientKind, ReturnToGo};
 
 /// One field of [`Config`].
 pub struct Field {
@@ -37,6 +37,13 @@ pub enum Kind {
         get: fn(&Config) -> String,
         set: fn(&mut Config, &str) -> bool,
     },
+    /// Free text, `none` for nothing.
+    Text {
+        expected: &'static str,
+        get: fn(&Config) -> String,
+        /// Whether the text was one that is expected.
+        set: fn(&mut Config, &str) -> bool,
+    },
 }
 
 /// A field outside its range.
@@ -66,6 +73,7 @@ impl Field {
             Kind::Real { low, high, .. } => format!("a number from {low} to {high}"),
             Kind::Whole { low, high, .. } => format!("a whole number from {low} to {high}"),
             Kind::Word { options, .. } => format!("one of {}", options().join(", ")),
+            Kind::Text { expected, .. } => (*expected).to_owned(),
         }
     }
 
@@ -85,6 +93,10 @@ impl Field {
                 if (*low..=*high).contains(&value) { Ok(()) } else { Err(self.error(value)) }
             }
             Kind::Word { .. } => Ok(()),
+            Kind::Text { get, set, .. } => {
+                let value = get(config);
+                if set(&mut config.clone(), &value) { Ok(()) } else { Err(self.error(value)) }
+            }
         }
     }
 
@@ -93,7 +105,7 @@ impl Field {
         let is_read = match &self.kind {
             Kind::Real { set, .. } => text.parse().map(|value| set(config, value)).is_ok(),
             Kind::Whole { set, .. } => text.parse().map(|value| set(config, value)).is_ok(),
-            Kind::Word { set, .. } => set(config, text),
+            Kind::Word { set, .. } | Kind::Text { set, .. } => set(config, text),
         };
         if is_read { self.check(config) } else { Err(self.error(text)) }
     }
@@ -103,7 +115,7 @@ impl Field {
         match &self.kind {
             Kind::Real { get, .. } => get(config).to_string(),
             Kind::Whole { get, .. } => get(config).to_string(),
-            Kind::Word { get, .. } => get(config),
+            Kind::Word { get, .. } | Kind::Text { get, .. } => get(config),
         }
     }
 }
@@ -130,8 +142,13 @@ macro_rules! word {
     };
 }
 
+/// `none`, or what `text` is for a value.
+fn optional<T>(value: &Option<T>, text: impl Fn(&T) -> String) -> String {
+    value.as_ref().map_or("none".to_owned(), text)
+}
+
 /// Every field, in the order of [`Config`].
-pub static FIELDS: [Field; 15] = [
+pub static FIELDS: [Field; 19] = [
     Field {
         name: "experts",
         label: "Experts n",
@@ -145,6 +162,14 @@ pub static FIELDS: [Field; 15] = [
         paper: Some("0.6"),
         help: "Weight of the clone's return in J = E[ensemble] − β E[clone] (Eq. 3). At 0 the experts care only about the goal.",
         kind: real!(beta, 0.0, Config::MAX_BETA),
+    },
+    Field {
+        name: "algorithm",
+        label: "Algorithm",
+        paper: Some("pg_ape"),
+        help: "How J is climbed: by policy gradient from sampled episodes (the paper's Algorithm 1), or by the exact gradient of \
+               J over T steps, without sampling and undiscounted (ours).",
+        kind: word!(algorithm, "pg_ape" => AlgorithmKind::PgApe, "exact" => AlgorithmKind::Exact),
     },
     Field {
         name: "observer",
@@ -233,6 +258,46 @@ pub static FIELDS: [Field; 15] = [
         paper: Some("3000000"),
         help: "Length of a run in ensemble steps: divided by the batch it gives the number of updates, 732 in the paper.",
         kind: whole!(total_steps, 1, u32::MAX),
+    },
+    Field {
+        name: "exact_updates",
+        label: "Run of exact APE (updates)",
+        paper: None,
+        help: "Length of a run of the algorithm exact, in updates.",
+        kind: whole!(exact_updates, 1, 100_000),
+    },
+    Field {
+        name: "adversary_reward",
+        label: "Adversary reward r̃",
+        paper: Some("none"),
+        help: "What the clone is to be denied in place of the reward: J = E[ensemble] − β E[Σ r̃ of the clone] (\"The Semantics of \
+               Reward\"). A cell counts for every step that begins there.",
+        kind: Kind::Text {
+            expected: AdversaryReward::FORM,
+            get: |config| optional(&config.adversary_reward, ToString::to_string),
+            set: |config, text| {
+                let reward = if text == "none" { Some(None) } else { text.parse().ok().map(Some) };
+                reward.map(|reward| config.adversary_reward = reward).is_some()
+            },
+        },
+    },
+    Field {
+        name: "alpha",
+        label: "Constraint α (steps)",
+        paper: Some("none"),
+        help: "Eq. 2: minimise the clone's return while the ensemble's return within T stays at least α. β then follows by dual \
+               ascent, from its value above.",
+        kind: Kind::Text {
+            expected: "none, or a return from -10000 to -0.1",
+            get: |config| optional(&config.alpha, ToString::to_string),
+            set: |config, text| {
+                let range = -10_000.0..=-0.1;
+                let text = text.replace('−', "-");
+                let value = text.parse().ok().filter(|value| range.contains(value)).map(Some);
+                let alpha = if text == "none" { Some(None) } else { value };
+                alpha.map(|alpha| config.alpha = alpha).is_some()
+            },
+        },
     },
     Field {
         name: "seed",

@@ -3,16 +3,26 @@
 //! Knows grids and policies ([`crate::mdp`]), and nothing of sessions or pages.
 
 mod adam;
+mod algorithm;
+mod choice;
 mod config;
 mod demonstrate;
 mod ensemble;
+mod exact_ape;
 mod fields;
 mod figures;
 pub mod observer;
 mod pg_ape;
+mod reward;
 
-pub use config::{BaselineKind, Config, GradientKind, ReturnToGo};
+pub use adam::Adam;
+pub use algorithm::{Algorithm, Trainer, softmax};
+pub use choice::{Choice, ChoiceError, Model, Parameter};
+pub use config::{AlgorithmKind, BaselineKind, Config, GradientKind, ReturnToGo};
+pub use demonstrate::{Demonstrator, Episode};
 pub use ensemble::{Contexts, Ensemble, EnsembleError, EnsembleFile};
+pub use exact_ape::{ExactApe, ExactGradient};
 pub use fields::{ConfigError, FIELDS, Field, Kind};
 pub use figures::{Figures, Identity};
-pub use pg_ape::{Gradient, Trainer};
+pub use pg_ape::{Gradient, PgApe};
+pub use reward::AdversaryReward;

@@ -8,16 +8,15 @@
 //! of a batch but how often each (context, state, action) was taken and the sum of the returns that followed:
 //! [`Tally`] is all that playing writes.
 
-use std::hash::Hasher;
-
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::adam::Adam;
+use super::algorithm::{Algorithm, add_entropy_bonus, softmax};
 use super::demonstrate::{ContextDraw, Demonstrator, Episode, action_draws};
 use super::observer::Observer;
-use super::{BaselineKind, Config, ConfigError, Contexts, Ensemble, GradientKind, ReturnToGo};
-use crate::mdp::{ACTIONS, Grid, Policy, Starts};
+use super::{BaselineKind, Config, Contexts, Ensemble, GradientKind, ReturnToGo};
+use crate::mdp::{ACTIONS, Grid, Starts};
 
 /// A batch of episodes as far as learning needs it, per (context, state, action).
 struct Tally {
@@ -40,11 +39,11 @@ impl Tally {
         (self.episodes, self.steps) = (0, 0);
     }
 
-    /// Adds an episode's steps with the returns that followed them.
-    fn add_episode(&mut self, entries: &[u32], to_go: &[f64], weights: &[f64]) {
+    /// Adds an episode's steps with the returns that followed them: `to_go(t)`, times a weight.
+    fn add_episode(&mut self, entries: &[u32], to_go: impl Fn(usize) -> f64, weights: &[f64]) {
         for (t, (&entry, weight)) in entries.iter().zip(weights).enumerate() {
             self.count[entry as usize] += 1;
-            self.returns[entry as usize] += weight * to_go[entries.len() - t];
+            self.returns[entry as usize] += weight * to_go(t);
         }
         self.episodes += 1;
         self.steps += entries.len() as u32;
@@ -68,7 +67,7 @@ pub struct Gradient {
 }
 
 /// A training run: the experts, their baselines, and all that an update needs.
-pub struct Trainer {
+pub struct PgApe {
     grid: Grid,
     config: Config,
     rng: Xoshiro256PlusPlus,
@@ -84,15 +83,16 @@ pub struct Trainer {
     to_go: Vec<f64>,
     /// What the return after step t counts: γᵗ for `from_start`, 1 for `from_step`: `[T]`.
     weights: Vec<f64>,
+    /// r̃(s, a), `[S][5]`, where the clone's reward is not the experts'.
+    adversary_reward: Option<Vec<[f64; ACTIONS]>>,
     ensemble_tally: Tally,
     clone_tally: Tally,
     episode: Episode,
 }
 
-impl Trainer {
-    /// A run at its start: all policies uniform, all baselines 0.
-    pub fn new(grid: Grid, config: Config) -> Result<Trainer, ConfigError> {
-        config.check()?;
+impl PgApe {
+    /// A run at its start: all policies uniform, all baselines 0. `config` must have been checked.
+    pub fn new(grid: Grid, config: Config) -> PgApe {
         let (experts, cells, horizon) = (config.experts as usize, grid.cells(), config.horizon as usize);
         let pairs = experts * cells;
         let values = match config.baseline {
@@ -109,7 +109,7 @@ impl Trainer {
                 weight *= config.discount;
             }
         }
-        Ok(Trainer {
+        PgApe {
             rng: Xoshiro256PlusPlus::seed_from_u64(u64::from(config.seed)),
             observer: config.observer.build(&grid, experts),
             logits: vec![0.0; pairs * ACTIONS],
@@ -122,69 +122,10 @@ impl Trainer {
             ensemble_tally: Tally::new(pairs * ACTIONS),
             clone_tally: Tally::new(pairs * ACTIONS),
             episode: Episode::default(),
+            adversary_reward: config.adversary_reward.as_ref().map(|reward| reward.table(&grid)),
             grid,
             config,
-        })
-    }
-
-    pub fn grid(&self) -> &Grid {
-        &self.grid
-    }
-
-    pub fn config(&self) -> &Config {
-        &self.config
-    }
-
-    /// Updates made so far.
-    pub fn updates(&self) -> u32 {
-        self.updates
-    }
-
-    /// β for the updates to come.
-    pub fn set_beta(&mut self, beta: f64) -> Result<(), ConfigError> {
-        let config = Config { beta, ..self.config.clone() };
-        config.check()?;
-        self.config = config;
-        Ok(())
-    }
-
-    /// The experts as they are now.
-    pub fn ensemble(&self) -> Ensemble {
-        let rows: Vec<[f64; ACTIONS]> = self.logits.as_chunks().0.iter().map(softmax).collect();
-        Ensemble::new(rows.chunks(self.grid.cells()).map(|rows| Policy::from_rows(rows.to_vec())).collect())
-    }
-
-    /// p(c|s) of the run's observer as it stands.
-    pub fn contexts(&mut self) -> Contexts {
-        let ensemble = self.ensemble();
-        self.observer.contexts(&self.grid, &ensemble, self.config.horizon)
-    }
-
-    /// A number that two runs share only when all their parameters agree to the last bit.
-    pub fn digest(&self) -> u64 {
-        let mut hash = fnv::FnvHasher::default();
-        for parameter in self.logits.iter().chain(&self.values) {
-            hash.write(&parameter.to_bits().to_le_bytes());
         }
-        hash.finish()
-    }
-
-    /// One iteration of Algorithm 1.
-    pub fn update(&mut self) {
-        let ensemble = self.ensemble();
-        // 2: generate trajectories τ₁ with π_c.
-        self.play_ensemble(&ensemble);
-        // 3: generate trajectories τ₂ with π_o.
-        let contexts = self.observer.contexts(&self.grid, &ensemble, self.config.horizon);
-        self.play_clone(&ensemble, &contexts);
-        // 4: gradient update on the experts, θ ← θ + α_θ ∇J(θ).
-        let mut gradient = self.policy_gradient(&ensemble, &contexts);
-        self.add_entropy_bonus(&ensemble, &mut gradient);
-        let value_gradient = self.value_gradient();
-        self.logits_adam.ascend(&mut self.logits, &gradient, self.config.learning_rate);
-        // 5: update of the value function, φ ← φ − α_φ ∇J(φ).
-        self.values_adam.ascend(&mut self.values, &value_gradient, self.config.learning_rate);
-        self.updates += 1;
     }
 
     /// The gradient that the next update would take, without entropy bonus and without taking it. Every
@@ -203,7 +144,8 @@ impl Trainer {
         let demonstrator = Demonstrator::new(&self.grid, ensemble, self.config.horizon);
         while self.ensemble_tally.steps < self.config.batch_steps {
             let context = demonstrator.play(&mut self.episode, &mut self.rng);
-            self.ensemble_tally.add_episode(&self.episode.entries, &self.to_go, &self.weights);
+            let steps = self.episode.entries.len();
+            self.ensemble_tally.add_episode(&self.episode.entries, |t| self.to_go[steps - t], &self.weights);
             self.observer.saw(context, &self.episode.states);
         }
     }
@@ -213,20 +155,47 @@ impl Trainer {
         let draws = action_draws(ensemble);
         let cells = self.grid.cells();
         let context_draws: Vec<ContextDraw> = (0..cells).map(|state| ContextDraw::new(contexts.row(state))).collect();
+        let memory = self.observer.memory(ensemble);
+        let mut remembered = Vec::new();
+        let mut p = vec![0.0; ensemble.experts()];
         self.clone_tally.clear();
         let starts = Starts::new(&self.grid);
         while self.clone_tally.steps < self.config.batch_steps {
             let mut state = starts.start(&mut self.rng);
             self.episode.entries.clear();
+            if let Some(memory) = &memory {
+                remembered = memory.start();
+            }
             while state != self.grid.goal() && self.episode.entries.len() < self.config.horizon as usize {
                 // One draw of 64 bits: half for the context, half for the action.
                 let bits = self.rng.next_u64();
-                let pair = context_draws[state].outcome((bits >> 32) as u32) * cells + state;
+                let context = match &memory {
+                    None => context_draws[state].outcome((bits >> 32) as u32),
+                    Some(memory) => {
+                        memory.see(&mut remembered, state, &mut p);
+                        ContextDraw::new(&p).outcome((bits >> 32) as u32)
+                    }
+                };
+                let pair = context * cells + state;
                 let action = draws[pair].outcome(bits as u32);
+                if let Some(memory) = &memory {
+                    memory.act(&mut remembered, state, action);
+                }
                 self.episode.entries.push((pair * ACTIONS + action) as u32);
                 state = starts.step(state, action, &mut self.rng);
             }
-            self.clone_tally.add_episode(&self.episode.entries, &self.to_go, &self.weights);
+            let entries = &self.episode.entries;
+            match &self.adversary_reward {
+                None => self.clone_tally.add_episode(entries, |t| self.to_go[entries.len() - t], &self.weights),
+                Some(reward) => {
+                    let mut to_go = vec![0.0; entries.len() + 1];
+                    for (t, &entry) in entries.iter().enumerate().rev() {
+                        let (pair, action) = (entry as usize / ACTIONS, entry as usize % ACTIONS);
+                        to_go[t] = reward[pair % cells][action] + self.config.discount * to_go[t + 1];
+                    }
+                    self.clone_tally.add_episode(entries, |t| to_go[t], &self.weights);
+                }
+            }
         }
     }
 
@@ -304,35 +273,6 @@ impl Trainer {
         gradient
     }
 
-    /// Weight of the entropy bonus for the coming update: linear from start to end, then as at the end.
-    fn entropy_weight(&self) -> f64 {
-        let Config { entropy_start, entropy_end, .. } = self.config;
-        let last = (self.config.updates() - 1).max(1);
-        entropy_start + (entropy_end - entropy_start) * f64::from(self.updates.min(last)) / f64::from(last)
-    }
-
-    /// Adds the gradient of the mean entropy of the policies where τ₁ and τ₂ went.
-    fn add_entropy_bonus(&self, ensemble: &Ensemble, gradient: &mut [f64]) {
-        let weight = self.entropy_weight();
-        if weight == 0.0 {
-            return;
-        }
-        let cells = self.grid.cells();
-        for (pair, gradient) in gradient.as_chunks_mut::<ACTIONS>().0.iter_mut().enumerate() {
-            let share = |tally: &Tally| tally.pair(pair).0 / f64::from(tally.steps);
-            let visited = share(&self.ensemble_tally) + share(&self.clone_tally);
-            if visited == 0.0 {
-                continue;
-            }
-            let pi = ensemble.policies()[pair / cells].row(pair % cells);
-            let log = pi.map(|p| if p > 0.0 { libm::log(p) } else { 0.0 });
-            let entropy: f64 = -pi.iter().zip(&log).map(|(p, log)| p * log).sum::<f64>();
-            for b in 0..ACTIONS {
-                gradient[b] -= weight * visited * pi[b] * (log[b] + entropy);
-            }
-        }
-    }
-
     /// −∇J(φ) (paper, Eq. 4): the way down the squared error of the baselines, per episode.
     fn value_gradient(&self) -> Vec<f64> {
         let Config { beta, value_weight, baseline, .. } = self.config;
@@ -355,10 +295,54 @@ impl Trainer {
     }
 }
 
-/// π(a) = exp θ_a / Σ exp θ, the same bits on every machine.
-fn softmax(logits: &[f64; ACTIONS]) -> [f64; ACTIONS] {
-    let top = logits.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    let weights = logits.map(|logit| libm::exp(logit - top));
-    let sum: f64 = weights.iter().sum();
-    weights.map(|weight| weight / sum)
+impl Algorithm for PgApe {
+    fn grid(&self) -> &Grid {
+        &self.grid
+    }
+
+    fn config(&self) -> &Config {
+        &self.config
+    }
+
+    fn set_beta(&mut self, beta: f64) {
+        self.config.beta = beta;
+    }
+
+    fn updates(&self) -> u32 {
+        self.updates
+    }
+
+    fn ensemble(&self) -> Ensemble {
+        softmax(&self.logits, self.grid.cells())
+    }
+
+    fn contexts(&mut self) -> Contexts {
+        let ensemble = self.ensemble();
+        self.observer.contexts(&self.grid, &ensemble, self.config.horizon)
+    }
+
+    fn parameters(&self) -> [&[f64]; 2] {
+        [&self.logits, &self.values]
+    }
+
+    /// One iteration of Algorithm 1.
+    fn update(&mut self) -> f64 {
+        let ensemble = self.ensemble();
+        // 2: generate trajectories τ₁ with π_c.
+        self.play_ensemble(&ensemble);
+        // 3: generate trajectories τ₂ with π_o.
+        let contexts = self.observer.contexts(&self.grid, &ensemble, self.config.horizon);
+        self.play_clone(&ensemble, &contexts);
+        // 4: gradient update on the experts, θ ← θ + α_θ ∇J(θ).
+        let mut gradient = self.policy_gradient(&ensemble, &contexts);
+        let share = |tally: &Tally, pair| tally.pair(pair).0 / f64::from(tally.steps);
+        let visited = |pair| share(&self.ensemble_tally, pair) + share(&self.clone_tally, pair);
+        add_entropy_bonus(&ensemble, self.config.entropy_weight(self.updates), visited, &mut gradient);
+        let value_gradient = self.value_gradient();
+        self.logits_adam.ascend(&mut self.logits, &gradient, self.config.learning_rate);
+        // 5: update of the value function, φ ← φ − α_φ ∇J(φ).
+        self.values_adam.ascend(&mut self.values, &value_gradient, self.config.learning_rate);
+        self.updates += 1;
+        -f64::from(self.ensemble_tally.steps) / f64::from(self.ensemble_tally.episodes)
+    }
 }

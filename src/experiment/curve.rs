@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::ape::Trainer;
-use crate::mdp::{RETURN_KINDS, Returns, Solver};
+use crate::mdp::{ACTIONS, Grid, Policy, RETURN_KINDS, Returns, Solver, occupancy};
 
 /// A run at one update.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -13,6 +13,16 @@ pub struct CurvePoint {
     pub ensemble: Returns,
     /// Of the clone by the run's own observer.
     pub clone: Returns,
+    /// What is collected of r̃, where the clone is to be denied that.
+    pub denied: Option<Denied>,
+}
+
+/// E[Σ r̃] within T, undiscounted, mean over the cells where episodes start.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Denied {
+    /// By the ensemble: mean of its experts.
+    pub ensemble: f64,
+    pub clone: f64,
 }
 
 impl CurvePoint {
@@ -20,13 +30,28 @@ impl CurvePoint {
     pub fn of(trainer: &mut Trainer) -> CurvePoint {
         let contexts = trainer.contexts();
         let ensemble = trainer.ensemble();
-        let horizon = trainer.config().horizon;
-        let mut solver = Solver::new(trainer.grid());
+        let (config, grid) = (trainer.config(), trainer.grid());
+        let mut solver = Solver::new(grid);
+        let clone = ensemble.cloned(&contexts);
+        let remembers = config.observer.model().remembers;
+        let denied = config.adversary_reward.as_ref().map(|reward| {
+            let reward = reward.table(grid);
+            let collected = |policy: &Policy| collected(grid, policy, config.horizon, &reward);
+            let by_experts: f64 = ensemble.policies().iter().map(collected).sum();
+            let by_experts = by_experts / ensemble.experts() as f64;
+            // A clone that remembers its episode has the ensemble's law.
+            Denied { ensemble: by_experts, clone: if remembers { by_experts } else { collected(&clone) } }
+        });
         CurvePoint {
             update: trainer.updates(),
-            beta: trainer.config().beta,
-            ensemble: Returns::mean(&ensemble.returns(&mut solver, horizon)),
-            clone: solver.evaluate(&ensemble.cloned(&contexts), horizon).returns,
+            beta: config.beta,
+            ensemble: Returns::mean(&ensemble.returns(&mut solver, config.horizon)),
+            clone: if remembers {
+                ensemble.law(&mut solver, config.horizon).returns
+            } else {
+                solver.evaluate(&clone, config.horizon).returns
+            },
+            denied,
         }
     }
 
@@ -34,7 +59,7 @@ impl CurvePoint {
     pub fn csv_head() -> String {
         let columns = ["ensemble", "clone"].into_iter().flat_map(|of| RETURN_KINDS.iter().map(move |kind| (of, kind)));
         let columns: Vec<String> = columns.map(|(of, kind)| format!("{of}_{}", kind.name)).collect();
-        format!("update,beta,{}", columns.join(","))
+        format!("update,beta,{},ensemble_denied,clone_denied", columns.join(","))
     }
 
     /// The point as a line of that table.
@@ -42,6 +67,14 @@ impl CurvePoint {
         let values =
             [self.ensemble, self.clone].into_iter().flat_map(|of| RETURN_KINDS.iter().map(move |kind| (kind.get)(&of)));
         let values: Vec<String> = values.map(|value| value.to_string()).collect();
-        format!("{},{},{}", self.update, self.beta, values.join(","))
+        let denied = self.denied.map_or(",".to_owned(), |denied| format!("{},{}", denied.ensemble, denied.clone));
+        format!("{},{},{},{denied}", self.update, self.beta, values.join(","))
     }
+}
+
+/// E[Σ r(s, a)] of a policy within T.
+fn collected(grid: &Grid, policy: &Policy, horizon: u32, reward: &[[f64; ACTIONS]]) -> f64 {
+    let visits = occupancy(grid, policy, horizon).visits;
+    let here = |state: usize| -> f64 { policy.row(state).iter().zip(&reward[state]).map(|(p, r)| p * r).sum() };
+    grid.starts().iter().map(|&s| visits[s as usize] * here(s as usize)).sum()
 }

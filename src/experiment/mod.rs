@@ -1,9 +1,25 @@
-//! Experiments: what a run starts from, the presets, and the course of a run.
+//! Experiments: what a run starts from, the presets, the course of a run; the attack bench, Table 1 and the sweep
+//! over β, each a list of independent tasks.
 
+mod baselines;
+mod bench;
 mod curve;
 mod presets;
 mod setup;
+mod statistics;
+mod sweep;
+mod table1;
+mod task;
 
-pub use curve::CurvePoint;
+pub use baselines::{METHODS, Method, PaperRow};
+pub use bench::{Attack, Bench, ensemble_returns};
+pub use curve::{CurvePoint, Denied};
 pub use presets::{PRESETS, Preset};
 pub use setup::{Setup, SetupError};
+pub use statistics::Summary;
+pub use sweep::{Sweep, SweepPoint, SweepRun};
+pub use table1::{MethodRun, Row, Table1};
+pub use task::{Outcome, Task};
+
+/// Tells the time in milliseconds since any moment; browsers and programs have different clocks.
+pub type Clock<'a> = &'a dyn Fn() -> f64;

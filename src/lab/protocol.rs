@@ -4,13 +4,14 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::ape::observer::ObserverChoice;
-use crate::experiment::{CurvePoint, Setup};
-use crate::mdp::Returns;
+use crate::ape::EnsembleFile;
+use crate::attack::{AttackerChoice, Cloned};
+use crate::experiment::{CurvePoint, Outcome, Setup};
+use crate::mdp::{KnownReturns, Policy, Returns};
 
 /// Version of the messages: an old cached worker must not be taken for a new one. [`Event::Ready`] stays the
 /// first variant, so that every version can read every other's.
-pub const PROTOCOL: u32 = 1;
+pub const PROTOCOL: u32 = 2;
 
 /// From the page to the session.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -37,8 +38,10 @@ pub enum Command {
     Reset,
     /// Updates per second; `None` is as fast as it goes.
     Speed(Option<f32>),
-    /// Clones to evaluate besides that of the run's own observer.
-    Show(Vec<ObserverChoice>),
+    /// Clones to evaluate besides that of the run's own observer; those that are not quick are left out.
+    Show(Vec<AttackerChoice>),
+    /// Send the ensemble as it is, in full precision.
+    Export,
     /// The snapshot of this number has been drawn.
     Seen(u32),
 }
@@ -53,8 +56,30 @@ pub enum Event {
     /// A run has begun; its snapshots follow.
     Started(Box<Started>),
     Snapshot(Box<Snapshot>),
+    /// What [`Command::Export`] asked for.
+    Exported(Box<Exported>),
     /// A command was not carried out; the sentence says why.
     Refused(String),
+}
+
+/// An ensemble, and which moment of which run it is.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Exported {
+    pub run: u32,
+    pub update: u32,
+    pub file: EnsembleFile,
+}
+
+/// From a worker that does a [`crate::experiment::Task`].
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub enum TaskEvent {
+    /// The worker listens.
+    Ready,
+    /// How much of it is done, 0..=1.
+    Progress(f32),
+    Done(Box<Outcome>),
+    /// It could not be done; the sentence says why.
+    Failed(String),
 }
 
 /// What stays the same during a run.
@@ -92,17 +117,12 @@ pub struct Snapshot {
     /// Time spent on updates while playing this run, in milliseconds.
     pub training_ms: f64,
     pub experts: Vec<PolicyView>,
+    /// Mean of the experts' returns.
+    pub ensemble: Returns,
     /// First that of the run's own observer, then those asked for.
     pub clones: Vec<CloneView>,
     /// Points of the curve since the last snapshot of this run.
     pub curve: Vec<CurvePoint>,
-}
-
-impl Snapshot {
-    /// Mean of the experts' returns.
-    pub fn ensemble(&self) -> Returns {
-        Returns::mean(&self.experts.iter().map(|expert| expert.returns).collect::<Vec<_>>())
-    }
 }
 
 /// A policy as the page draws it.
@@ -112,16 +132,39 @@ pub struct PolicyView {
     pub policy: Vec<[f32; 5]>,
     /// h(s) in steps, uncapped, `[S]`; what is longer than `f32::MAX` is that.
     pub hitting_time: Vec<f32>,
-    pub returns: Returns,
+    pub returns: KnownReturns,
 }
 
-/// A clone, and what its observer takes p(c|s) to be.
+/// A clone, and what it takes p(c|s) to be. One with a memory is as at the start of an episode, its
+/// `hitting_time` the expected steps of an episode from there.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CloneView {
-    pub observer: ObserverChoice,
-    /// p(c|s), `[S][n]`.
+    pub cloner: AttackerChoice,
+    /// p(c|s), `[S][n]`; empty where the clone is no mixture.
     pub contexts: Vec<f32>,
     pub view: PolicyView,
+}
+
+impl PolicyView {
+    /// `steps`: expected steps to the goal, `[S]`.
+    pub fn new(policy: &Policy, steps: &[f64], returns: KnownReturns) -> PolicyView {
+        PolicyView {
+            policy: policy.rows().iter().map(|row| row.map(|p| p as f32)).collect(),
+            hitting_time: steps.iter().map(|&h| (h as f32).min(f32::MAX)).collect(),
+            returns,
+        }
+    }
+}
+
+impl CloneView {
+    pub fn new(cloner: AttackerChoice, cloned: &Cloned) -> CloneView {
+        let contexts = cloned.contexts.as_ref().map_or(&[][..], |contexts| contexts.as_slice());
+        CloneView {
+            cloner,
+            contexts: contexts.iter().map(|&p| p as f32).collect(),
+            view: PolicyView::new(&cloned.policy, &cloned.steps, cloned.returns),
+        }
+    }
 }
 
 /// A message as bytes.

@@ -3,11 +3,11 @@
 //! It is driven from outside: [`Session::handle`] takes a command, [`Session::advance`] works for a few
 //! milliseconds and says when to call it again, [`Session::events`] hands out what is to be sent.
 
-use super::{CloneView, Command, Event, PolicyView, RunState, Snapshot, Started};
-use crate::ape::observer::ObserverChoice;
-use crate::ape::{Config, Contexts, Ensemble, EnsembleFile, Trainer};
+use super::{CloneView, Command, Event, Exported, PolicyView, RunState, Snapshot, Started};
+use crate::ape::{Config, Ensemble, EnsembleFile, Trainer};
+use crate::attack::{AttackerChoice, Cloned, Target};
 use crate::experiment::{CurvePoint, Setup};
-use crate::mdp::{Grid, Policy, Solver, Value, optimal_policy};
+use crate::mdp::{Grid, Policy, Returns, Solver, optimal_policy};
 
 /// Longest stretch of work between two looks at the inbox, in milliseconds.
 const STRETCH: f64 = 8.0;
@@ -63,7 +63,7 @@ pub struct Session {
     run: Option<Run>,
     runs: u32,
     speed: Option<f32>,
-    show: Vec<ObserverChoice>,
+    show: Vec<AttackerChoice>,
     /// A β to retrain with when the retraining under way has ended.
     next_beta: Option<f64>,
     outbox: Vec<Event>,
@@ -145,7 +145,13 @@ impl Session {
                 self.allowance = 0.0;
                 return Ok(());
             }
-            Command::Show(observers) => self.show = observers,
+            Command::Show(cloners) => self.show = cloners,
+            Command::Export => {
+                let run = self.run.as_ref().ok_or(NOTHING)?;
+                let exported = run.export(self.runs);
+                self.outbox.push(Event::Exported(Box::new(exported)));
+                return Ok(());
+            }
             Command::Seen(number) => {
                 self.in_flight.retain(|&(sent, _)| sent > number);
                 return Ok(());
@@ -196,7 +202,7 @@ impl Session {
         self.outbox.push(Event::Started(Box::new(Started {
             run: self.runs,
             setup: setup.clone(),
-            optimal: policy_view(&optimal, value),
+            optimal: PolicyView::new(&optimal, &value.hitting_time, value.returns.into()),
         })));
         let is_training = matches!(subject, Subject::Training(_));
         let mut run = Run {
@@ -336,13 +342,23 @@ impl Run {
         }
     }
 
-    /// p(c|s) of the run's own observer.
-    fn own_contexts(&mut self, ensemble: &Ensemble) -> Contexts {
-        let Config { observer, horizon, seed, .. } = self.setup.config;
+    /// The clone by the run's own observer: one that has watched the training knows more than one that begins now.
+    fn own_clone(&mut self, target: &Target) -> Option<Cloned> {
+        let observer = self.setup.config.observer;
         match &mut self.subject {
-            Subject::Training(trainer) => trainer.contexts(),
-            Subject::Given { grid, .. } => observer.contexts(grid, ensemble, horizon, seed),
+            Subject::Training(trainer) if !observer.model().remembers => {
+                Some(Cloned::mixture(target, trainer.contexts()))
+            }
+            _ => AttackerChoice::of(observer).clone_of(target, &mut |_| true),
         }
+    }
+
+    fn export(&self, run: u32) -> Exported {
+        let (update, config) = match &self.subject {
+            Subject::Training(trainer) => (trainer.updates(), Some(self.setup.config.clone())),
+            Subject::Given { .. } => (0, self.setup.ensemble.as_ref().and_then(|file| file.config.clone())),
+        };
+        Exported { run, update, file: EnsembleFile::new(self.subject.grid(), &self.ensemble(), config) }
     }
 
     fn add_curve_point(&mut self) {
@@ -351,26 +367,27 @@ impl Run {
         }
     }
 
-    fn snapshot(&mut self, number: u32, run: u32, show: &[ObserverChoice]) -> Snapshot {
-        let Config { observer: own, horizon, seed, .. } = self.setup.config;
+    fn snapshot(&mut self, number: u32, run: u32, show: &[AttackerChoice]) -> Snapshot {
+        let Config { observer, horizon, seed, .. } = self.setup.config;
         let ensemble = self.ensemble();
-        let own_contexts = self.own_contexts(&ensemble);
-        let grid = self.subject.grid();
-        let mut solver = Solver::new(grid);
-        let mut view = |policy: &Policy| policy_view(policy, solver.evaluate(policy, horizon));
+        let grid = self.subject.grid().clone();
+        let target = Target { grid: &grid, ensemble: &ensemble, horizon, seed };
+        let mut solver = Solver::new(&grid);
+        let mut returns = Vec::new();
+        let mut view = |policy: &Policy| {
+            let value = solver.evaluate(policy, horizon);
+            returns.push(value.returns);
+            PolicyView::new(policy, &value.hitting_time, value.returns.into())
+        };
         let experts = ensemble.policies().iter().map(&mut view).collect();
+        let own = AttackerChoice::of(observer);
         let mut clones: Vec<CloneView> = Vec::new();
-        for observer in std::iter::once(own).chain(show.iter().copied()) {
-            if clones.iter().any(|clone| clone.observer == observer) {
+        for cloner in std::iter::once(own).chain(show.iter().copied()) {
+            if clones.iter().any(|clone| clone.cloner == cloner) || !cloner.model().is_quick {
                 continue;
             }
-            let contexts =
-                if observer == own { own_contexts.clone() } else { observer.contexts(grid, &ensemble, horizon, seed) };
-            clones.push(CloneView {
-                observer,
-                view: view(&ensemble.cloned(&contexts)),
-                contexts: contexts.as_slice().iter().map(|&p| p as f32).collect(),
-            });
+            let cloned = if cloner == own { self.own_clone(&target) } else { cloner.clone_of(&target, &mut |_| true) };
+            clones.extend(cloned.map(|cloned| CloneView::new(cloner, &cloned)));
         }
         let (update, beta, digest) = match &self.subject {
             Subject::Training(trainer) => (trainer.updates(), trainer.config().beta, trainer.digest()),
@@ -392,16 +409,9 @@ impl Run {
             digest,
             training_ms: self.training_ms,
             experts,
+            ensemble: Returns::mean(&returns),
             clones,
             curve: std::mem::take(&mut self.curve),
         }
-    }
-}
-
-fn policy_view(policy: &Policy, value: Value) -> PolicyView {
-    PolicyView {
-        policy: policy.rows().iter().map(|row| row.map(|p| p as f32)).collect(),
-        hitting_time: value.hitting_time.iter().map(|&h| (h as f32).min(f32::MAX)).collect(),
-        returns: value.returns,
     }
 }

@@ -1,10 +1,12 @@
-//! A session in a thread, for the native window.
+//! A session and the hands of a pool in threads, for the native window.
 
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, TryRecvError, channel};
 use std::time::{Duration, Instant};
 
-use super::{Command, Event, Link, PROTOCOL, Pace, Session};
+use super::{Command, Event, Hand, Link, PROTOCOL, Pace, Pool, Session, TaskEvent};
+use crate::experiment::Task;
 
 /// The page's end of a thread that runs a session.
 pub struct ThreadLink {
@@ -98,4 +100,66 @@ fn start(wake: Arc<dyn Fn() + Send + Sync>) -> (Sender<Command>, Receiver<Event>
         }
     });
     (commands, events)
+}
+
+/// A pool of threads, one for each core but that of the window.
+pub fn thread_pool(wake: impl Fn() + Send + Sync + 'static) -> Pool {
+    let wake: Arc<dyn Fn() + Send + Sync> = Arc::new(wake);
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    Pool::new(cores.saturating_sub(1), move || Box::new(ThreadHand { wake: wake.clone(), at_work: None }))
+}
+
+struct ThreadHand {
+    wake: Arc<dyn Fn() + Send + Sync>,
+    /// What the thread says, and whether it is to stop.
+    at_work: Option<(Receiver<TaskEvent>, Arc<AtomicBool>)>,
+}
+
+impl Hand for ThreadHand {
+    fn begin(&mut self, task: &Task) {
+        let (sender, receiver) = channel();
+        let is_stopped = Arc::new(AtomicBool::new(false));
+        self.at_work = Some((receiver, is_stopped.clone()));
+        let (task, at_end) = (task.clone(), WakeAtEnd(self.wake.clone()));
+        std::thread::spawn(move || {
+            let at_end = at_end;
+            let sender = sender;
+            let begin = Instant::now();
+            let clock = || begin.elapsed().as_secs_f64() * 1000.0;
+            let mut progress = |done: f64| {
+                // Whoever does not listen any more has stopped it, too.
+                let is_heard = sender.send(TaskEvent::Progress(done as f32)).is_ok();
+                (at_end.0)();
+                is_heard && !is_stopped.load(Ordering::Relaxed)
+            };
+            let _ = match task.run(&clock, &mut progress) {
+                Ok(Some(outcome)) => sender.send(TaskEvent::Done(Box::new(outcome))),
+                Ok(None) => Ok(()),
+                Err(sentence) => sender.send(TaskEvent::Failed(sentence)),
+            };
+        });
+    }
+
+    fn receive(&mut self) -> Option<Result<TaskEvent, String>> {
+        let (receiver, _) = self.at_work.as_ref()?;
+        match receiver.try_recv() {
+            Ok(event) => {
+                if !matches!(event, TaskEvent::Progress(_)) {
+                    self.at_work = None;
+                }
+                Some(Ok(event))
+            }
+            Err(TryRecvError::Empty) => None,
+            Err(TryRecvError::Disconnected) => {
+                self.at_work = None;
+                Some(Err("A thread has stopped.".to_owned()))
+            }
+        }
+    }
+
+    fn stop(&mut self) {
+        if let Some((_, is_stopped)) = self.at_work.take() {
+            is_stopped.store(true, Ordering::Relaxed);
+        }
+    }
 }

@@ -11,7 +11,7 @@ mod rollout;
 pub use grid::{Action, Cell, Grid, GridError, GridSpec};
 pub use optimal::optimal_policy;
 pub use policy::{Policy, PolicyError};
-pub use returns::{CAP, HORIZON, Occupancy, RETURN_KINDS, ReturnKind, Returns, Solver, Value, occupancy};
+pub use returns::{CAP, HORIZON, KnownReturns, Occupancy, RETURN_KINDS, ReturnKind, Returns, Solver, Value, occupancy};
 pub use rollout::{Draw, Starts};
 
 /// Number of actions.

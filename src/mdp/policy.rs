@@ -1,9 +1,11 @@
 //! A stationary policy: for every cell, the probability of each action.
 
+use serde::{Deserialize, Serialize};
+
 use super::{ACTIONS, Cell, Grid};
 
 /// `π[s][a]`, one row for every cell of a grid. Rows of free cells sum to 1; rows of walls mean nothing.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Policy {
     rows: Vec<[f64; ACTIONS]>,
 }

@@ -95,6 +95,40 @@ impl Returns {
     }
 }
 
+/// Returns as far as they are known. A clone with a memory has no stationary policy, and so no hitting times to
+/// cap; what it returns within T may be simulated.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct KnownReturns {
+    pub capped_return: Option<f64>,
+    pub uncapped_return: Option<f64>,
+    pub horizon_return: f64,
+    pub success: f64,
+    /// Half the width of the 95 % confidence interval of `horizon_return`; 0 where it is exact.
+    pub horizon_error: f64,
+    /// The same of `success`.
+    pub success_error: f64,
+}
+
+impl From<Returns> for KnownReturns {
+    fn from(returns: Returns) -> KnownReturns {
+        KnownReturns {
+            capped_return: Some(returns.capped_return),
+            uncapped_return: Some(returns.uncapped_return),
+            horizon_return: returns.horizon_return,
+            success: returns.success,
+            horizon_error: 0.0,
+            success_error: 0.0,
+        }
+    }
+}
+
+impl KnownReturns {
+    /// The return of this place in [`RETURN_KINDS`], where it is known.
+    pub fn get(&self, kind: usize) -> Option<f64> {
+        [self.capped_return, self.uncapped_return, Some(self.horizon_return), Some(self.success)][kind]
+    }
+}
+
 /// Hitting times and returns of one policy.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Value {
@@ -147,13 +181,24 @@ impl<'g> Solver<'g> {
     pub fn evaluate(&mut self, policy: &Policy, horizon: u32) -> Value {
         let hitting_time = self.hitting_times(policy);
         let (horizon_return, success) = within_horizon(self.grid, policy, horizon);
-        let mean = |of: &dyn Fn(f64) -> f64| {
-            let sum: f64 = self.grid.starts().iter().map(|&s| of(hitting_time[s as usize])).sum();
-            sum / self.grid.free_cells() as f64
+        let returns = Returns {
+            capped_return: self.capped_return(&hitting_time),
+            uncapped_return: -self.mean(&hitting_time, |h| h),
+            horizon_return,
+            success,
         };
-        let returns =
-            Returns { capped_return: -mean(&|h| h.min(CAP)), uncapped_return: -mean(&|h| h), horizon_return, success };
         Value { hitting_time, returns }
+    }
+
+    /// −mean min(h(s), 100) of hitting times `[S]`.
+    pub fn capped_return(&self, hitting_time: &[f64]) -> f64 {
+        -self.mean(hitting_time, |h| h.min(CAP))
+    }
+
+    /// Over the free cells, the goal included.
+    fn mean(&self, hitting_time: &[f64], of: impl Fn(f64) -> f64) -> f64 {
+        let sum: f64 = self.grid.starts().iter().map(|&s| of(hitting_time[s as usize])).sum();
+        sum / self.grid.free_cells() as f64
     }
 
     /// h(s) of π̃, `[S]`.

@@ -3,14 +3,22 @@
 use egui::{CentralPanel, Frame, Margin, RichText, ScrollArea, Ui};
 
 use super::board::Shown;
+use super::experiments::bench::BenchTab;
+use super::experiments::sweep::SweepTab;
+use super::experiments::table1::Table1Tab;
 use super::heatmap::Pictures;
+use super::host::Host;
 use super::panels::Touched;
 use super::theme::{self, GAP, NARROW, Palette, SPACE, WIDE};
+use super::widgets::choose;
 use super::{controls, focus, headline, help, toolbar};
-use crate::ape::Config;
 use crate::ape::observer::ObserverChoice;
-use crate::experiment::{PRESETS, Setup};
-use crate::lab::{Command, Event, Link, PROTOCOL, Snapshot, Started};
+use crate::ape::{Config, EnsembleFile};
+use crate::attack::AttackerChoice;
+use crate::experiment::{Outcome, PRESETS, Setup, Task};
+use crate::lab::{
+    CloneView, Command, Event, Exported, Link, PROTOCOL, Pool, RunState, Snapshot, Started, TaskEvent, TaskId,
+};
 
 /// What moving β does.
 #[derive(Clone, Copy, PartialEq)]
@@ -21,12 +29,33 @@ pub enum BetaMode {
     Continue,
 }
 
+/// The parts of the page beside the controls.
+#[derive(Clone, Copy, PartialEq)]
+pub enum Tab {
+    Train,
+    Sweep,
+    Bench,
+    Table1,
+}
+
+/// What an ensemble is wanted for, once the session has sent it.
+#[derive(Clone, Copy, PartialEq)]
+pub enum Wanted {
+    /// Attack it on the bench.
+    Bench,
+    /// Give it to the visitor as a file.
+    Save,
+    /// Make the clones that are not quick.
+    Clones,
+}
+
 /// How the page looks at a run; nothing here changes the run.
 pub struct View {
+    pub tab: Tab,
     /// Place in [`crate::mdp::RETURN_KINDS`] of the return that is shown.
     pub kind: usize,
     /// Who clones, one for each clone panel; the first is in the headline too.
-    pub clones: Vec<ObserverChoice>,
+    pub clones: Vec<AttackerChoice>,
     pub beta_mode: BetaMode,
     /// Place in [`toolbar::SPEEDS`].
     pub speed: usize,
@@ -61,6 +90,20 @@ pub struct App {
     notice: Option<String>,
     pub view: View,
     pictures: Pictures,
+    pub pool: Pool,
+    host: Box<dyn Host>,
+    bench: BenchTab,
+    table1: Table1Tab,
+    sweep: SweepTab,
+    /// What the next ensembles from the session are for.
+    wanted: Vec<Wanted>,
+    /// Clones being made that are not quick, and those that were, each with the run and update it is of.
+    making: Vec<(TaskId, (u32, u32), AttackerChoice)>,
+    made: Vec<((u32, u32), CloneView)>,
+    /// Name of the file that the ensemble on the page was read from.
+    pub opened: Option<String>,
+    /// The page's clock, in seconds.
+    now: f64,
     /// Snapshots taken in, over all sessions.
     taken: u64,
     /// A snapshot that has come and not been drawn yet.
@@ -69,7 +112,7 @@ pub struct App {
 
 impl App {
     /// Opens the page on the first preset; training starts when the session is ready.
-    pub fn new(ctx: &egui::Context, link: Box<dyn Link>) -> App {
+    pub fn new(ctx: &egui::Context, link: Box<dyn Link>, pool: Pool, host: Box<dyn Host>) -> App {
         theme::install(ctx);
         let mut app = App {
             link,
@@ -80,6 +123,7 @@ impl App {
             shown: None,
             notice: None,
             view: View {
+                tab: Tab::Train,
                 kind: 0,
                 clones: Vec::new(),
                 beta_mode: BetaMode::Retrain,
@@ -89,6 +133,16 @@ impl App {
                 is_by_keyboard: false,
             },
             pictures: Pictures::default(),
+            pool,
+            host,
+            bench: BenchTab::default(),
+            table1: Table1Tab::default(),
+            sweep: SweepTab::default(),
+            wanted: Vec::new(),
+            making: Vec::new(),
+            made: Vec::new(),
+            opened: None,
+            now: 0.0,
             taken: 0,
             undrawn: None,
         };
@@ -130,6 +184,7 @@ impl App {
     pub fn load_preset(&mut self, index: usize) {
         self.setup = (PRESETS[index].setup)();
         self.preset = Some(index);
+        self.opened = None;
         self.show_clones_of(self.setup.config.observer);
         self.load();
     }
@@ -142,7 +197,43 @@ impl App {
         self.setup.config = config;
         self.setup.ensemble = None;
         self.preset = None;
+        self.opened = None;
         self.load();
+    }
+
+    /// Asks the session for the ensemble.
+    pub fn want(&mut self, wanted: Wanted) {
+        if !self.wanted.contains(&wanted) {
+            self.wanted.push(wanted);
+            self.send(Command::Export);
+        }
+    }
+
+    /// Gives a file to the visitor.
+    pub fn save(&mut self, name: &str, text: &str) {
+        self.notice = self.host.save(name, text).err();
+    }
+
+    pub fn ask_for_file(&mut self) {
+        self.notice = self.host.ask_for_file().err();
+    }
+
+    /// Shows the ensemble of a file; one that is no good is refused with a sentence.
+    fn open(&mut self, name: String, text: Result<String, String>) {
+        let file = text.and_then(|text| EnsembleFile::parse(&text).map_err(|error| error.to_string()));
+        let checked = file.and_then(|file| file.clone().check().map(|_| file).map_err(|error| error.to_string()));
+        match checked {
+            Err(sentence) => self.notice = Some(format!("{name}: {sentence}.")),
+            Ok(file) => {
+                self.setup.grid = file.grid.clone();
+                self.setup.config = file.config.clone().unwrap_or_default();
+                self.setup.ensemble = Some(file);
+                self.preset = None;
+                self.show_clones_of(self.setup.config.observer);
+                self.opened = Some(name);
+                self.load();
+            }
+        }
     }
 
     pub fn set_beta(&mut self, beta: f64) {
@@ -163,12 +254,12 @@ impl App {
 
     /// The clone that is trained against, and the honest one or the blind one beside it.
     fn show_clones_of(&mut self, observer: ObserverChoice) {
-        let beside =
-            if observer == ObserverChoice::OCCUPANCY { ObserverChoice::UNIFORM } else { ObserverChoice::OCCUPANCY };
-        self.show_clones(vec![observer, beside]);
+        let own = AttackerChoice::of(observer);
+        let beside = if own == AttackerChoice::OCCUPANCY { AttackerChoice::UNIFORM } else { AttackerChoice::OCCUPANCY };
+        self.show_clones(vec![own, beside]);
     }
 
-    fn show_clones(&mut self, clones: Vec<ObserverChoice>) {
+    fn show_clones(&mut self, clones: Vec<AttackerChoice>) {
         self.view.clones = clones;
         self.send(Command::Show(self.view.clones.clone()));
     }
@@ -189,12 +280,112 @@ impl App {
                 }
                 Ok(Event::Started(started)) => self.begun = Some(*started),
                 Ok(Event::Snapshot(snapshot)) => self.take(*snapshot),
+                Ok(Event::Exported(exported)) => self.take_ensemble(*exported),
                 Ok(Event::Refused(sentence)) => self.notice = Some(sentence),
                 Err(sentence) => {
                     self.session = Session::Failed(sentence);
                     self.begun = None;
+                    self.wanted.clear();
                 }
             }
+        }
+        for (id, event) in self.pool.receive() {
+            self.bench.hear(id, &event, self.now);
+            self.table1.hear(id, &event, self.now);
+            self.sweep.hear(id, &event, self.now);
+            self.take_clone(id, event);
+        }
+        while let Some((name, text)) = self.host.opened() {
+            self.open(name, text);
+        }
+    }
+
+    /// An ensemble has come: to each of those who wanted it.
+    fn take_ensemble(&mut self, exported: Exported) {
+        for wanted in std::mem::take(&mut self.wanted) {
+            match wanted {
+                Wanted::Bench => {
+                    let mut bench = std::mem::take(&mut self.bench);
+                    bench.attack(exported.clone(), self, self.now);
+                    self.bench = bench;
+                }
+                Wanted::Save => {
+                    if let Ok(text) = serde_json::to_string(&exported.file) {
+                        self.save("ape-ensemble.json", &text);
+                    }
+                }
+                Wanted::Clones => self.make_clones(&exported),
+            }
+        }
+    }
+
+    /// Begins to make the clones on the page that are not quick, where they are not there for this moment.
+    fn make_clones(&mut self, exported: &Exported) {
+        let moment = (exported.run, exported.update);
+        for attacker in self.slow_clones() {
+            let is_made = self.made.iter().any(|(of, clone)| *of == moment && clone.cloner == attacker);
+            let is_being_made = self.making.iter().any(|(_, of, cloner)| *of == moment && *cloner == attacker);
+            if is_made || is_being_made {
+                continue;
+            }
+            let Config { horizon, seed, .. } = self.setup.config;
+            let ensemble = Box::new(EnsembleFile { config: None, ..exported.file.clone() });
+            let id = self.pool.begin(Task::Attack { ensemble, attacker, horizon, seed });
+            self.making.push((id, moment, attacker));
+        }
+    }
+
+    fn slow_clones(&self) -> Vec<AttackerChoice> {
+        self.view.clones.iter().copied().filter(|cloner| !cloner.model().is_quick).collect()
+    }
+
+    /// A clone that is not quick has been made, or not.
+    fn take_clone(&mut self, id: TaskId, event: TaskEvent) {
+        let Some(index) = self.making.iter().position(|(task, ..)| *task == id) else { return };
+        match event {
+            TaskEvent::Ready | TaskEvent::Progress(_) => {}
+            TaskEvent::Failed(sentence) => {
+                self.making.remove(index);
+                self.notice = Some(sentence);
+            }
+            TaskEvent::Done(outcome) => {
+                let (_, moment, cloner) = self.making.remove(index);
+                if let Outcome::Attack(_, cloned) = *outcome {
+                    self.made.push((moment, CloneView::new(cloner, &cloned)));
+                }
+                self.add_made_clones();
+            }
+        }
+    }
+
+    /// Adds the clones that are not quick to the snapshot on the page; where it rests, those that are missing are
+    /// asked for.
+    fn add_made_clones(&mut self) {
+        let slow = self.slow_clones();
+        let Some(shown) = &mut self.shown else { return };
+        let moment = (shown.snapshot.run, shown.snapshot.update);
+        // Of moments gone by nothing is kept.
+        self.made.retain(|(of, _)| *of == moment);
+        self.making.retain(|(id, of, _)| {
+            if *of != moment {
+                self.pool.cancel(*id);
+            }
+            *of == moment
+        });
+        for (_, clone) in &self.made {
+            if !shown.snapshot.clones.iter().any(|other| other.cloner == clone.cloner) {
+                shown.snapshot.clones.push(clone.clone());
+                self.taken += 1;
+                shown.version = self.taken;
+            }
+        }
+        let is_resting = shown.snapshot.state != RunState::Playing && self.begun.is_none();
+        let is_missing = |cloner: &AttackerChoice| {
+            !shown.snapshot.clones.iter().any(|clone| clone.cloner == *cloner)
+                && !self.making.iter().any(|(_, _, making)| making == cloner)
+        };
+        if is_resting && slow.iter().any(is_missing) {
+            self.want(Wanted::Clones);
         }
     }
 
@@ -210,6 +401,7 @@ impl App {
             shown.snapshot = snapshot;
             shown.version = self.taken;
         }
+        self.add_made_clones();
     }
 }
 
@@ -233,6 +425,10 @@ impl App {
     }
 
     fn draw(&mut self, ui: &mut Ui) {
+        self.now = ui.input(|input| input.time);
+        for file in ui.input(|input| input.raw.dropped_files.clone()) {
+            self.host.read(file);
+        }
         let width = ui.available_width();
         if width < NARROW {
             theme::enlarge_targets(ui);
@@ -243,7 +439,7 @@ impl App {
             CentralPanel::no_frame().frame(sheet).show(ui, |ui| {
                 ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
                     self.show_top(ui);
-                    self.show_board(ui, Shown::show_stacked);
+                    self.show_tab(ui, Shown::show_stacked);
                     ui.add_space(GAP);
                     theme::card(ui).show(ui, |ui| {
                         ui.set_width(ui.available_width());
@@ -274,7 +470,7 @@ impl App {
                 top: 0,
                 bottom: 10,
             });
-            CentralPanel::no_frame().frame(rest).show(ui, |ui| self.show_board(ui, Shown::show_planned));
+            CentralPanel::no_frame().frame(rest).show(ui, |ui| self.show_tab(ui, Shown::show_planned));
         }
         self.show_help(ui);
         focus::show(ui, &mut self.view.is_by_keyboard);
@@ -320,6 +516,49 @@ impl App {
         {
             self.notice = None;
         }
+    }
+
+    /// The tabs, and the one that is open.
+    fn show_tab(&mut self, ui: &mut Ui, draw: fn(&Shown, &mut Ui, &View, &mut Pictures) -> Touched) {
+        let options = [
+            (Tab::Train, "Train", "Policies and their training, live"),
+            (Tab::Sweep, "β sweep", "Whole runs for many β"),
+            (Tab::Bench, "Attack bench", "Every cloner against the ensemble that is shown"),
+            (Tab::Table1, "Table 1", "The paper's comparison, over seeds"),
+        ];
+        choose(ui, "Tab", &mut self.view.tab, &options);
+        ui.add_space(2.0);
+        if self.view.tab == Tab::Train {
+            return self.show_board(ui, draw);
+        }
+        theme::card(ui).show(ui, |ui| {
+            ui.set_width(ui.available_width());
+            let is_stacked = ui.ctx().content_rect().width() < WIDE;
+            let mut show = |ui: &mut Ui| match self.view.tab {
+                Tab::Train => {}
+                Tab::Sweep => {
+                    let mut tab = std::mem::take(&mut self.sweep);
+                    tab.show(ui, self);
+                    self.sweep = tab;
+                }
+                Tab::Bench => {
+                    let mut tab = std::mem::take(&mut self.bench);
+                    tab.show(ui, self);
+                    self.bench = tab;
+                }
+                Tab::Table1 => {
+                    let mut tab = std::mem::take(&mut self.table1);
+                    tab.show(ui, self);
+                    self.table1 = tab;
+                }
+            };
+            if is_stacked {
+                // The page itself scrolls.
+                show(ui);
+            } else {
+                ScrollArea::vertical().auto_shrink([false, false]).show(ui, show);
+            }
+        });
     }
 
     /// The run that is shown, by `draw`; then what the visitor did to it.

@@ -90,7 +90,6 @@ impl Shown {
     }
 
     fn show_chart(&self, ui: &mut Ui, view: &View) {
-        let observer = self.started.setup.config.observer.to_string();
-        chart::show(ui, &self.curve, &self.snapshot, &observer, view);
+        chart::show(ui, &self.curve, &self.snapshot, &self.started.setup.config, view);
     }
 }

@@ -1,86 +1,179 @@
-//! The chart: returns of ensemble and clone over training, and what PG-APE climbs.
+//! Charts: lines and points over axes with legible ticks; and the chart of a training run.
 
-use egui::{Color32, Label, Rangef, RichText, TextStyle, Ui};
-use egui_plot::{AxisHints, GridInput, Line, LineStyle, Plot, PlotPoints, uniform_grid_spacer};
+use egui::{Color32, Label, Rangef, RichText, TextStyle, Ui, Vec2, vec2};
+use egui_plot::{
+    AxisHints, GridInput, HoverPosition, Line, LineStyle, Plot, PlotPoint, PlotPoints, Points, Text,
+    uniform_grid_spacer,
+};
 
 use super::app::View;
 use super::numbers;
 use super::theme::Palette;
+use crate::ape::Config;
 use crate::experiment::CurvePoint;
 use crate::lab::{RunState, Snapshot};
 use crate::mdp::RETURN_KINDS;
 
-/// Draws the curve of a run into all the space there is.
-pub fn show(ui: &mut Ui, curve: &[CurvePoint], snapshot: &Snapshot, observer: &str, view: &View) {
+/// A line or a cloud of points.
+pub struct Curve {
+    pub name: String,
+    pub color: Color32,
+    pub points: Vec<[f64; 2]>,
+    pub style: Style,
+}
+
+#[derive(Clone, Copy, PartialEq)]
+pub enum Style {
+    Solid,
+    Dashed,
+    /// A line with its points marked.
+    Marked,
+    Points,
+}
+
+/// What the axes say, and what they must hold besides the curves.
+pub struct Axes {
+    pub id: &'static str,
+    pub size: Vec2,
+    pub include: Vec<[f64; 2]>,
+    /// A number on an axis, and in the words beside the pointer.
+    pub x: fn(f64) -> String,
+    pub y: fn(f64) -> String,
+    /// Words at points.
+    pub labels: Vec<([f64; 2], String)>,
+}
+
+/// Draws curves over axes.
+pub fn plot(ui: &mut Ui, axes: Axes, curves: Vec<Curve>) {
     let palette = Palette::of(ui);
-    let kind = &RETURN_KINDS[view.kind];
-    let unit = if kind.is_steps { "steps" } else { "probability" };
-    let title = format!("Over training, {} ({unit}):", kind.label);
-    let j = "J = ensemble − β·clone";
-    let clone = format!("clone ({observer})");
-    if snapshot.state == RunState::Given {
-        ui.label(RichText::new("Over training: nothing, as this ensemble was given.").small().color(palette.muted));
-        return;
-    }
-    ui.spacing_mut().interact_size.y = 14.0;
-    ui.spacing_mut().item_spacing.y = 2.0;
-    ui.horizontal_wrapped(|ui| {
-        ui.label(RichText::new(title).small().color(palette.muted));
-        for (name, color) in [("ensemble", palette.accent), (&clone, palette.clone), (j, palette.muted)] {
-            if name != j || kind.is_steps {
-                ui.add(Label::new(RichText::new(format!("• {name}")).small().color(color)).extend());
-            }
-        }
-    });
-    let line = |name: &str, color: Color32, value: &dyn Fn(&CurvePoint) -> f64| {
-        let points: Vec<[f64; 2]> = curve.iter().map(|point| [f64::from(point.update), value(point)]).collect();
-        Line::new(name.to_owned(), PlotPoints::from(points)).color(color).width(2.0)
-    };
-    let lines = [
-        Some(line("ensemble", palette.accent, &|point| (kind.get)(&point.ensemble))),
-        Some(line(&clone, palette.clone, &|point| (kind.get)(&point.clone))),
-        // Eq. 3, of this kind of return.
-        kind.is_steps.then(|| {
-            line(j, palette.muted, &|point| (kind.get)(&point.ensemble) - point.beta * (kind.get)(&point.clone))
-                .style(LineStyle::dashed_loose())
-        }),
-    ];
-    let axis = |hints: AxisHints<'static>| {
+    let hints = |hints: AxisHints<'static>| {
         hints.tick_label_color(palette.muted).tick_label_font(TextStyle::Small.resolve(ui.style()))
     };
-    let size = ui.available_size();
-    Plot::new("curve")
-        .width(size.x)
-        .height(size.y.max(70.0))
+    let Axes { x, y, .. } = axes;
+    let mut plot = Plot::new(axes.id)
+        .width(axes.size.x)
+        .height(axes.size.y)
         .allow_zoom(false)
         .allow_drag(false)
         .allow_scroll(false)
         .allow_boxed_zoom(false)
         .show_background(false)
-        .include_x(0.0)
-        .include_x(f64::from(snapshot.last_update))
-        .include_y(0.0)
-        .include_y(if kind.is_steps { 0.0 } else { 1.0 })
         .grid_color(palette.line)
         .x_grid_spacer(uniform_grid_spacer(ticks))
         .y_grid_spacer(uniform_grid_spacer(ticks))
         .custom_x_axes(vec![
-            axis(AxisHints::new_x())
-                .label_spacing(Rangef::new(20.0, 36.0))
-                .formatter(|mark, _| numbers::decimal(mark.value, 0)),
+            hints(AxisHints::new_x()).label_spacing(Rangef::new(20.0, 36.0)).formatter(move |mark, _| x(mark.value)),
         ])
         .custom_y_axes(vec![
-            axis(AxisHints::new_y())
-                .label_spacing(Rangef::new(14.0, 24.0))
-                .formatter(|mark, _| axis_label(mark.value, kind.is_steps)),
+            hints(AxisHints::new_y()).label_spacing(Rangef::new(14.0, 24.0)).formatter(move |mark, _| y(mark.value)),
         ])
         .label_formatter(move |position| match position {
-            egui_plot::HoverPosition::NearDataPoint { plot_name, position, .. } => {
-                Some(format!("{plot_name}\nupdate {:.0}: {}", position.x, numbers::of_kind(kind, position.y)))
+            HoverPosition::NearDataPoint { plot_name, position, .. } => {
+                Some(format!("{plot_name}\n{}: {}", x(position.x), y(position.y)))
             }
-            egui_plot::HoverPosition::Elsewhere { .. } => None,
-        })
-        .show(ui, |plot| lines.into_iter().flatten().for_each(|line| plot.line(line)));
+            HoverPosition::Elsewhere { .. } => None,
+        });
+    for [x, y] in axes.include {
+        plot = plot.include_x(x).include_y(y);
+    }
+    plot.show(ui, |plot| {
+        for Curve { name, color, points, style } in curves {
+            if style != Style::Points {
+                let line = Line::new(name.clone(), PlotPoints::from(points.clone())).color(color).width(2.0);
+                plot.line(if style == Style::Dashed { line.style(LineStyle::dashed_loose()) } else { line });
+            }
+            if matches!(style, Style::Marked | Style::Points) {
+                plot.points(Points::new(name, PlotPoints::from(points)).color(color).radius(3.5));
+            }
+        }
+        for ([x, y], label) in axes.labels {
+            let text = RichText::new(label).small().color(palette.muted);
+            plot.text(Text::new("", PlotPoint::new(x, y), text).anchor(egui::Align2::LEFT_BOTTOM));
+        }
+    });
+}
+
+/// The names of curves in their colours, on one line where there is room.
+pub fn legend<'a>(ui: &mut Ui, title: &str, curves: impl Iterator<Item = (&'a str, Color32)>) {
+    ui.spacing_mut().interact_size.y = 14.0;
+    ui.spacing_mut().item_spacing.y = 2.0;
+    ui.horizontal_wrapped(|ui| {
+        ui.label(RichText::new(title).small().color(Palette::of(ui).muted));
+        for (name, color) in curves {
+            ui.add(Label::new(RichText::new(format!("• {name}")).small().color(color)).extend());
+        }
+    });
+}
+
+/// Draws the curve of a run into all the space there is: returns of ensemble and clone and what is climbed; and
+/// β below, where it moves by itself.
+pub fn show(ui: &mut Ui, curve: &[CurvePoint], snapshot: &Snapshot, config: &Config, view: &View) {
+    let palette = Palette::of(ui);
+    let kind = &RETURN_KINDS[view.kind];
+    if snapshot.state == RunState::Given {
+        ui.label(RichText::new("Over training: nothing, as this ensemble was given.").small().color(palette.muted));
+        return;
+    }
+    let curve_of = |name: &str, color: Color32, style: Style, value: &dyn Fn(&CurvePoint) -> f64| Curve {
+        name: name.to_owned(),
+        color,
+        points: curve.iter().map(|point| [f64::from(point.update), value(point)]).collect(),
+        style,
+    };
+    let mut curves = vec![
+        curve_of("ensemble", palette.accent, Style::Solid, &|point| (kind.get)(&point.ensemble)),
+        curve_of(&format!("clone ({})", config.observer), palette.clone, Style::Solid, &|point| {
+            (kind.get)(&point.clone)
+        }),
+    ];
+    let is_denied = curve.iter().any(|point| point.denied.is_some());
+    if is_denied {
+        let collected = |point: &CurvePoint| point.denied.map_or(0.0, |denied| denied.clone);
+        curves.push(curve_of("r̃ of the clone", palette.warning, Style::Solid, &collected));
+    } else if kind.is_steps {
+        // Eq. 3, of this kind of return.
+        curves.push(curve_of("J = ensemble − β·clone", palette.muted, Style::Dashed, &|point| {
+            (kind.get)(&point.ensemble) - point.beta * (kind.get)(&point.clone)
+        }));
+    }
+    let unit = if kind.is_steps { "steps" } else { "probability" };
+    let title = format!("Over training, {} ({unit}):", kind.label);
+    legend(ui, &title, curves.iter().map(|curve| (&*curve.name, curve.color)));
+    let moves = config.alpha.is_some();
+    let size = ui.available_size();
+    let below = if moves { (0.3 * size.y).max(60.0) } else { 0.0 };
+    let last = f64::from(snapshot.last_update);
+    let x = |update: f64| numbers::decimal(update, 0);
+    let axes = Axes {
+        id: "curve",
+        size: vec2(size.x, (size.y - below).max(70.0)),
+        include: vec![[0.0, 0.0], [last, if kind.is_steps { 0.0 } else { 1.0 }]],
+        x,
+        y: if kind.is_steps { in_steps } else { |value| numbers::decimal(value, 2) },
+        labels: Vec::new(),
+    };
+    plot(ui, axes, curves);
+    if moves {
+        let beta = curve_of("β", palette.ink, Style::Solid, &|point| point.beta);
+        legend(ui, "Dual ascent:", [("β", palette.ink)].into_iter());
+        let axes = Axes {
+            id: "beta",
+            size: vec2(size.x, (below - 18.0).max(50.0)),
+            include: vec![[0.0, 0.0], [last, 0.1]],
+            x,
+            y: |value| numbers::decimal(value, 2),
+            labels: Vec::new(),
+        };
+        plot(ui, axes, vec![beta]);
+    }
+}
+
+/// Steps on an axis: whole as a rule, powers of ten where they are huge.
+pub fn in_steps(value: f64) -> String {
+    if value.abs() >= 9999.5 {
+        return numbers::steps(value);
+    }
+    numbers::decimal(value, usize::from(value.fract().abs() > 1e-9))
 }
 
 /// Distances of grid lines: 1, 2 or 5 times a power of ten, some eight of them over an axis.
@@ -90,11 +183,4 @@ fn ticks(input: GridInput) -> [f64; 3] {
     let step = [1.0, 2.0, 5.0, 10.0].map(|times| times * power).into_iter().find(|&step| step >= least);
     let step = step.unwrap_or(10.0 * power);
     [step, 10.0 * step, 100.0 * step]
-}
-
-fn axis_label(value: f64, is_steps: bool) -> String {
-    if !is_steps {
-        return numbers::decimal(value, 1);
-    }
-    if value.abs() < 9999.5 { numbers::decimal(value, 0) } else { numbers::steps(value) }
 }

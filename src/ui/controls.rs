@@ -5,12 +5,12 @@ use egui::{CollapsingHeader, ComboBox, DragValue, RichText, Ui};
 use super::app::App;
 use super::theme::Palette;
 use super::toolbar;
-use super::widgets::{Icon, icon_button, section};
+use super::widgets::{Icon, choose, icon_button, section};
 use crate::ape::observer::ObserverChoice;
-use crate::ape::{Config, FIELDS, Field, Kind};
+use crate::ape::{AlgorithmKind, Config, FIELDS, Field, Kind};
 
 /// Fields that stand elsewhere on the page; the rest is under "advanced".
-const ELSEWHERE: [&str; 4] = ["experts", "beta", "observer", "seed"];
+const ELSEWHERE: [&str; 5] = ["algorithm", "experts", "beta", "observer", "seed"];
 
 pub fn show(ui: &mut Ui, app: &mut App) {
     let mut config = app.setup().config.clone();
@@ -19,6 +19,17 @@ pub fn show(ui: &mut Ui, app: &mut App) {
         let text = "This preset shows a given ensemble. Changing anything here trains one.";
         ui.label(RichText::new(text).small().color(Palette::of(ui).muted));
     }
+    section(ui, "Algorithm");
+    let options = [
+        (AlgorithmKind::PgApe, "PG-APE", "The paper's Algorithm 1: policy gradient from sampled episodes"),
+        (
+            AlgorithmKind::Exact,
+            "exact",
+            "The exact gradient of J over T steps, nothing sampled (ours). It needs an observer with a formula: uniform or occupancy.",
+        ),
+    ];
+    let before = config.clone();
+    choose(ui, "Algorithm", &mut config.algorithm, &options);
     section(ui, "Observer");
     ui.label(RichText::new("Who do the experts expect to clone them?").small().color(Palette::of(ui).muted));
     for choice in ObserverChoice::all() {
@@ -37,6 +48,14 @@ pub fn show(ui: &mut Ui, app: &mut App) {
             ui.label(RichText::new(range.meaning).small().color(Palette::of(ui).muted));
             config.observer = config.observer.with_parameter(value);
         });
+    }
+    // What is chosen last is what counts: the other gives way where the two do not go together.
+    if config.check().is_err() && config.algorithm == AlgorithmKind::Exact {
+        if config.observer == before.observer {
+            config.observer = ObserverChoice::OCCUPANCY;
+        } else {
+            config.algorithm = AlgorithmKind::PgApe;
+        }
     }
     section(ui, "Experts");
     ui.horizontal_wrapped(|ui| {
@@ -112,6 +131,29 @@ fn show_field(ui: &mut Ui, field: &Field, config: &mut Config) {
                     set(config, value);
                 }
             }
+            Kind::Text { get, set, expected } => {
+                // What is being typed, while it differs from what holds.
+                let id = ui.scope_id().with(field.name);
+                let now = get(config);
+                let mut text = ui.data(|data| data.get_temp::<String>(id)).unwrap_or_else(|| now.clone());
+                let edit = egui::TextEdit::singleline(&mut text).desired_width(ui.available_width() - 8.0);
+                let response = ui.add(edit).accessible_name(field.label).on_hover_text(tip);
+                if response.changed() {
+                    ui.data_mut(|data| data.insert_temp(id, text.clone()));
+                }
+                if !response.has_focus() && text != now {
+                    if set(config, text.trim()) {
+                        ui.data_mut(|data| data.remove_temp::<String>(id));
+                    } else {
+                        ui.end_row();
+                        let sentence = format!("{text:?}: expected {expected}.");
+                        ui.label(RichText::new(sentence).small().color(palette.warning));
+                        if ui.small_button("undo").clicked() {
+                            ui.data_mut(|data| data.remove_temp::<String>(id));
+                        }
+                    }
+                }
+            }
             Kind::Word { options, get, set } => {
                 let chosen = get(config);
                 let response = ComboBox::from_id_salt(field.name)
@@ -127,7 +169,7 @@ fn show_field(ui: &mut Ui, field: &Field, config: &mut Config) {
                 response.accessible_name(field.label).on_hover_text(tip);
             }
         }
-        if let Some(value) = field.paper {
+        if let Some(value) = field.paper.filter(|_| !matches!(field.kind, Kind::Text { .. })) {
             let mut paper = Config::default();
             let is_papers = field.set(&mut paper, value).is_ok() && field.text(&paper) == field.text(config);
             let mark = if is_papers { "as paper".to_owned() } else { format!("paper: {value}") };

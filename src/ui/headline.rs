@@ -8,27 +8,27 @@ use super::theme::{self, Palette, SPACE};
 use super::widgets::{choose, spoken};
 use crate::ape::{Config, Field};
 use crate::lab::{RunState, Snapshot, Started};
-use crate::mdp::{RETURN_KINDS, Returns};
+use crate::mdp::{KnownReturns, RETURN_KINDS, Returns};
 
 /// The figures that the headline is about.
 struct Headline {
     ensemble: Returns,
-    clone: Returns,
-    optimal: Returns,
-    /// Whose clone it is.
-    observer: String,
+    clone: KnownReturns,
+    optimal: KnownReturns,
+    /// Who clones.
+    cloner: String,
 }
 
 impl Headline {
     fn of(started: &Started, snapshot: &Snapshot, view: &View) -> Option<Headline> {
         // Until the session has evaluated the one asked for, the run's own.
-        let asked = view.clones.first().and_then(|asked| snapshot.clones.iter().find(|clone| clone.observer == *asked));
+        let asked = view.clones.first().and_then(|asked| snapshot.clones.iter().find(|clone| clone.cloner == *asked));
         let clone = asked.or(snapshot.clones.first())?;
         Some(Headline {
-            ensemble: snapshot.ensemble(),
+            ensemble: snapshot.ensemble,
             clone: clone.view.returns,
             optimal: started.optimal.returns,
-            observer: clone.observer.to_string(),
+            cloner: clone.cloner.to_string(),
         })
     }
 }
@@ -94,20 +94,25 @@ fn figures(ui: &mut Ui, app: &mut App, columns: usize) {
         return;
     };
     let kind = &RETURN_KINDS[app.view.kind];
-    let get = kind.get;
-    let (ensemble, clone, optimal) = (get(&headline.ensemble), get(&headline.clone), get(&headline.optimal));
+    let at = app.view.kind;
+    let ensemble = (kind.get)(&headline.ensemble);
+    let (clone, optimal) = (headline.clone.get(at), headline.optimal.get(at));
+    let written = |value: Option<f64>| value.map_or("–".to_owned(), |value| numbers::of_kind(kind, value));
     let unit = if kind.is_steps { " steps" } else { "" };
-    let ratio = if kind.is_steps { format!("{}×", numbers::decimal(clone / ensemble, 1)) } else { "–".to_owned() };
+    let ratio = match clone {
+        Some(clone) if kind.is_steps => format!("{}×", numbers::decimal(clone / ensemble, 1)),
+        _ => "–".to_owned(),
+    };
     let shown = [
         ("Ensemble", palette.accent, numbers::of_kind(kind, ensemble), unit, "Mean of the experts' returns."),
         (
-            &format!("Clone ({})", headline.observer),
+            &format!("Clone ({})", headline.cloner),
             palette.clone,
-            numbers::of_kind(kind, clone),
+            written(clone),
             unit,
-            "Return of the policy that an observer of the demonstrations ends up with: the first clone panel.",
+            "Return of the policy that an observer of the demonstrations ends up with: the first clone panel. Of a clone with a memory only what T steps give is known.",
         ),
-        ("Optimal", palette.ink, numbers::of_kind(kind, optimal), unit, "The best that any policy can do."),
+        ("Optimal", palette.ink, written(optimal), unit, "The best that any policy can do."),
         ("Clone ÷ ensemble", palette.ink, ratio, "", "How many times as many steps the clone needs."),
     ];
     Grid::new("figures").spacing(vec2(1.5 * SPACE, 2.0)).min_col_width(70.0).show(ui, |ui| {
@@ -163,12 +168,12 @@ fn sentence(app: &App) -> String {
         1 => ("The expert".to_owned(), "reaches", "arrives"),
         n => (format!("The {n} experts"), "reach", "arrive"),
     };
-    let steps = |returns: &Returns| numbers::decimal(-returns.horizon_return, 0);
-    let share = |returns: &Returns| numbers::percent(returns.success);
+    let steps = |returns: &KnownReturns| numbers::decimal(-returns.horizon_return, 0);
+    let share = |returns: &KnownReturns| numbers::percent(returns.success);
     // Below this share of arrivals steps are not the story.
-    let is_lost = |returns: &Returns| returns.success < 0.9;
-    let (ensemble, clone) = (&headline.ensemble, &headline.clone);
-    let theirs = format!("{} clone ({})", if n == 1 { "its" } else { "their" }, headline.observer);
+    let is_lost = |returns: &KnownReturns| returns.success < 0.9;
+    let (ensemble, clone) = (&KnownReturns::from(headline.ensemble), &headline.clone);
+    let theirs = format!("{} clone ({})", if n == 1 { "its" } else { "their" }, headline.cloner);
     match (is_lost(ensemble), is_lost(clone)) {
         (false, true) => {
             let lost = format!("{theirs} gets lost: it arrives in {} of episodes", share(clone));

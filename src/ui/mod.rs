@@ -2,22 +2,27 @@
 //!
 //! - [`App`] (app.rs): what the page knows, what it hears and what it asks for.
 //! - toolbar, headline, controls, board (panels, chart, inspector), help: the parts of the page.
-//! - heatmap: one policy on one grid. theme: every colour, font and distance. numbers: how they are written.
+//! - experiments: the tabs beside training. host: files, which a browser and a window give in different ways.
+//! - heatmap: one policy on one grid. chart, table: figures over figures. theme: every colour, font and distance. numbers: how they are written.
 //!   widgets: small pieces that several parts use. focus: the ring around what the keyboard acts on.
 
 mod app;
 mod board;
 mod chart;
 mod controls;
+mod experiments;
 mod focus;
 mod headline;
 mod heatmap;
 mod help;
+mod host;
 mod inspector;
 mod numbers;
 mod panels;
+mod table;
 mod theme;
 mod toolbar;
 mod widgets;
 
 pub use app::App;
+pub use host::{Host, check_length};

@@ -22,6 +22,18 @@ pub fn steps(value: f64) -> String {
     format!("{}×10{}", decimal(mantissa, 1), superscript(exponent as u32))
 }
 
+/// Steps in a table: two decimals, powers of ten where they are huge.
+pub fn short(value: f64) -> String {
+    if value.abs() < 9999.5 { decimal(value, 2) } else { steps(value) }
+}
+
+/// A count with its thousands apart.
+pub fn grouped(count: u32) -> String {
+    let digits = count.to_string();
+    let groups: Vec<&str> = digits.as_bytes().rchunks(3).rev().filter_map(|g| std::str::from_utf8(g).ok()).collect();
+    groups.join(",")
+}
+
 fn superscript(number: u32) -> String {
     let digits = ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'];
     number.to_string().bytes().map(|byte| digits[usize::from(byte - b'0')]).collect()
@@ -52,6 +64,7 @@ mod tests {
         assert_eq!(steps(-16.94), "−16.9");
         assert_eq!(steps(-0.01), "0.0");
         assert_eq!(steps(-1.67e9), "−1.7×10⁹");
+        assert_eq!([7, 100, 1000, 1_234_567].map(grouped), ["7", "100", "1,000", "1,234,567"]);
         assert_eq!(steps(12345.0), "1.2×10⁴");
         assert_eq!((steps(-1e300).as_str(), steps(f64::INFINITY).as_str()), ("< −10³⁸", "> 10³⁸"));
         assert_eq!([0.0, 1.0, 0.999_99, 0.001, 0.136].map(percent), ["0 %", "100 %", "> 99 %", "< 1 %", "14 %"]);

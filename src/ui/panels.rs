@@ -7,8 +7,8 @@ use super::heatmap::{Heatmap, Pictures};
 use super::numbers;
 use super::theme::{self, GAP, Palette};
 use super::widgets::{Icon, icon_button};
-use crate::ape::observer::ObserverChoice;
-use crate::lab::{PolicyView, Snapshot, Started};
+use crate::attack::AttackerChoice;
+use crate::lab::{PolicyView, RunState, Snapshot, Started};
 use crate::mdp::{Grid, RETURN_KINDS};
 
 /// A panel: what it shows and what it is called.
@@ -20,6 +20,8 @@ pub struct Panel<'a> {
     pub policy: Option<&'a PolicyView>,
     /// For a clone its place in [`View::clones`], and p(c|s).
     pub clone: Option<(usize, &'a [f32])>,
+    /// What is said in the place of its figures until then.
+    pub waiting: String,
 }
 
 /// All panels, in order.
@@ -29,21 +31,37 @@ pub fn list<'a>(started: &'a Started, snapshot: &'a Snapshot, view: &View) -> Ve
         short: format!("E{}", index + 1),
         policy: Some(policy),
         clone: None,
+        waiting: String::new(),
     });
-    let clones = view.clones.iter().enumerate().map(|(index, observer)| {
-        let clone = snapshot.clones.iter().find(|clone| clone.observer == *observer);
+    let clones = view.clones.iter().enumerate().map(|(index, cloner)| {
+        let clone = snapshot.clones.iter().find(|clone| clone.cloner == *cloner);
         let contexts = clone.map_or(&[][..], |clone| &clone.contexts);
-        let title = format!("Clone ({observer})");
+        let title = format!("Clone ({cloner})");
         Panel {
             title,
-            short: observer.to_string(),
+            short: cloner.to_string(),
             policy: clone.map(|clone| &clone.view),
             clone: Some((index, contexts)),
+            waiting: waiting(*cloner, snapshot.state),
         }
     });
-    let optimal =
-        Panel { title: "Optimal".to_owned(), short: "optimal".to_owned(), policy: Some(&started.optimal), clone: None };
+    let optimal = Panel {
+        title: "Optimal".to_owned(),
+        short: "optimal".to_owned(),
+        policy: Some(&started.optimal),
+        clone: None,
+        waiting: String::new(),
+    };
     experts.chain(clones).chain(std::iter::once(optimal)).collect()
+}
+
+/// Why a clone is not there yet.
+fn waiting(cloner: AttackerChoice, state: RunState) -> String {
+    match state {
+        _ if cloner.model().is_quick => "evaluating …".to_owned(),
+        RunState::Playing => "made when training rests".to_owned(),
+        _ => "being made …".to_owned(),
+    }
 }
 
 /// What a visitor did to the panels.
@@ -52,7 +70,7 @@ pub struct Touched {
     /// The cell under the pointer.
     pub cell: Option<usize>,
     /// The clones to show from now on.
-    pub clones: Option<Vec<ObserverChoice>>,
+    pub clones: Option<Vec<AttackerChoice>>,
 }
 
 /// Height of a panel's title.
@@ -140,11 +158,19 @@ pub fn show(
 /// A panel in words.
 fn describe(title: &str, policy: &PolicyView) -> String {
     let returns = &policy.returns;
-    format!(
-        "{title}: arrows and hitting times. Capped return {} steps, success {}.",
-        numbers::steps(returns.capped_return),
-        numbers::percent(returns.success)
-    )
+    let success = numbers::percent(returns.success);
+    match returns.capped_return {
+        Some(capped) => {
+            format!(
+                "{title}: arrows and hitting times. Capped return {} steps, success {success}.",
+                numbers::steps(capped)
+            )
+        }
+        None => format!(
+            "{title}: arrows at the start of an episode and steps within T. Return within T {} steps, success {success}.",
+            numbers::steps(returns.horizon_return)
+        ),
+    }
 }
 
 fn show_title(ui: &mut Ui, panel: &Panel, height: f32, view: &View, touched: &mut Touched) {
@@ -163,10 +189,10 @@ fn show_title(ui: &mut Ui, panel: &Panel, height: f32, view: &View, touched: &mu
             }
             let side = ui.spacing().interact_size.y;
             let width = ui.available_width() - button.map_or(0.0, |_| side + 4.0);
-            choose_observer(ui, index, width, view, touched);
+            choose_cloner(ui, index, width, view, touched);
             match button {
                 Some(Icon::Add) if icon_button(ui, Icon::Add, "Show a second clone beside it", false).clicked() => {
-                    let other = ObserverChoice::all().find(|choice| !view.clones.contains(choice));
+                    let other = AttackerChoice::all().find(|choice| !view.clones.contains(choice));
                     touched.clones = Some(view.clones.iter().copied().chain(other).collect());
                 }
                 Some(Icon::Remove) if icon_button(ui, Icon::Remove, "Remove this clone", false).clicked() => {
@@ -179,11 +205,14 @@ fn show_title(ui: &mut Ui, panel: &Panel, height: f32, view: &View, touched: &mu
     });
     let kind = &RETURN_KINDS[view.kind];
     let text = match panel.policy.map(|policy| &policy.returns) {
-        None => "evaluating …".to_owned(),
+        None => panel.waiting.clone(),
         Some(returns) => {
-            let value = numbers::of_kind(kind, (kind.get)(returns));
             let arrive = format!("{} arrive", numbers::percent(returns.success));
-            if kind.is_steps { format!("{value} steps, {arrive}") } else { arrive }
+            match returns.get(view.kind) {
+                _ if !kind.is_steps => arrive,
+                Some(value) => format!("{} steps, {arrive}", numbers::steps(value)),
+                None => format!("{} steps within T, {arrive}", numbers::steps(returns.horizon_return)),
+            }
         }
     };
     ui.allocate_ui_with_layout(vec2(line.x, 20.0), Layout::left_to_right(Align::Center), |ui| {
@@ -191,13 +220,15 @@ fn show_title(ui: &mut Ui, panel: &Panel, height: f32, view: &View, touched: &mu
     });
 }
 
-fn choose_observer(ui: &mut Ui, index: usize, width: f32, view: &View, touched: &mut Touched) {
+fn choose_cloner(ui: &mut Ui, index: usize, width: f32, view: &View, touched: &mut Touched) {
     let chosen = view.clones[index];
     let name = format!("Who clones, panel {}", index + 1);
-    let choices: Vec<ObserverChoice> = ObserverChoice::all()
-        .map(|choice| if choice.model().name == chosen.model().name { chosen } else { choice })
-        .filter(|choice| *choice == chosen || !view.clones.contains(choice))
-        .collect();
+    let mut choices = AttackerChoice::usual();
+    if !choices.contains(&chosen) {
+        choices.insert(0, chosen);
+    }
+    let choices: Vec<AttackerChoice> =
+        choices.into_iter().filter(|choice| *choice == chosen || !view.clones.contains(choice)).collect();
     let response = ComboBox::from_id_salt(("clone", index))
         .width(width.max(60.0))
         .truncate()

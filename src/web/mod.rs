@@ -1,6 +1,7 @@
-//! What only a browser has: the worker that runs the session, and the mirror of the page for assistive
-//! technology. Nothing here draws, trains or decides.
+//! What only a browser has: the workers, files, and the mirror of the page for assistive technology. Nothing here draws, trains or decides.
 
+#[cfg(feature = "page")]
+mod files;
 #[cfg(feature = "page")]
 mod mirror;
 #[cfg(feature = "page")]

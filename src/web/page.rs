@@ -4,8 +4,9 @@ use eframe::{WebOptions, WebRunner};
 use wasm_bindgen::prelude::*;
 use web_sys::HtmlCanvasElement;
 
+use super::files::Files;
 use super::mirror::Mirror;
-use super::worker::WorkerLink;
+use super::worker::{WorkerLink, worker_pool};
 use crate::ui::App;
 
 #[wasm_bindgen]
@@ -42,9 +43,17 @@ async fn run() -> Result<(), String> {
             WebOptions::default(),
             Box::new(|cc| {
                 cc.egui_ctx.add_plugin(mirror);
-                let wake = cc.egui_ctx.clone();
-                let link = WorkerLink::new(move || wake.request_repaint());
-                Ok(Box::new(App::new(&cc.egui_ctx, Box::new(link))))
+                let waker = || {
+                    let ctx = cc.egui_ctx.clone();
+                    move || ctx.request_repaint()
+                };
+                let link = WorkerLink::new(waker());
+                Ok(Box::new(App::new(
+                    &cc.egui_ctx,
+                    Box::new(link),
+                    worker_pool(waker()),
+                    Box::new(Files::new(waker())),
+                )))
             }),
         )
         .await

@@ -1,71 +1,54 @@
-//! Both ends of the Web Worker. Messages are bytes in transferred buffers; a string is a failure's sentence.
+//! Both ends of the Web Workers: one runs the session, others do tasks. Messages are bytes in transferred buffers; a
+//! string is a failure's sentence. Which of the two a worker is, its name says.
 
 use std::cell::{Cell, RefCell};
 use std::collections::VecDeque;
 use std::rc::Rc;
 
 use js_sys::{Array, ArrayBuffer, Uint8Array};
+use serde::Serialize;
+use serde::de::DeserializeOwned;
 use wasm_bindgen::prelude::*;
-use web_sys::{DedicatedWorkerGlobalScope, ErrorEvent, MessageChannel, MessageEvent, Worker};
+use web_sys::{DedicatedWorkerGlobalScope, ErrorEvent, MessageChannel, MessageEvent, Worker, WorkerOptions};
 
-use crate::lab::{Command, Event, Link, PROTOCOL, Pace, Session, decode, encode};
+use crate::experiment::Task;
+use crate::lab::{Command, Event, Hand, Link, PROTOCOL, Pace, Pool, Session, TaskEvent, decode, encode};
 
-/// The page's end of a worker.
-pub struct WorkerLink {
-    wake: Rc<dyn Fn()>,
-    inbox: Rc<RefCell<VecDeque<Result<Event, String>>>>,
+const SESSION: &str = "session";
+const TASKS: &str = "tasks";
+
+/// A worker, and what it has said: messages of type `E`.
+struct Line<E> {
     worker: Option<Worker>,
+    inbox: Rc<RefCell<VecDeque<Result<E, String>>>>,
+    /// What the worker calls; kept as long as it may.
     handlers: Option<Handlers>,
 }
 
-/// What a worker calls; kept as long as it may.
 struct Handlers {
     _on_message: Closure<dyn Fn(MessageEvent)>,
     _on_error: Closure<dyn Fn(ErrorEvent)>,
 }
 
-impl WorkerLink {
+impl<E: DeserializeOwned + 'static> Line<E> {
     const SCRIPT: &str = "./worker_loader.js";
 
-    /// Starts the worker; `wake` is called when an event has arrived.
-    pub fn new(wake: impl Fn() + 'static) -> WorkerLink {
-        let mut link = WorkerLink { wake: Rc::new(wake), inbox: Rc::default(), worker: None, handlers: None };
-        link.restart();
-        link
-    }
-}
-
-impl Link for WorkerLink {
-    fn send(&mut self, command: &Command) {
-        let Some(worker) = &self.worker else { return };
-        let buffer = Uint8Array::from(&encode(command)[..]).buffer();
-        if let Err(error) = worker.post_message_with_transfer(&buffer, &Array::of1(&buffer)) {
-            self.inbox.borrow_mut().push_back(Err(format!("The worker could not be reached ({error:?}).")));
-        }
-    }
-
-    fn receive(&mut self) -> Option<Result<Event, String>> {
-        let event = self.inbox.borrow_mut().pop_front()?;
-        if event.is_err() {
-            self.stop();
-        }
-        Some(event)
-    }
-
-    fn restart(&mut self) {
-        self.stop();
-        self.inbox = Rc::default();
-        let worker = match Worker::new(Self::SCRIPT) {
+    /// Starts a worker of this name; `wake` is called when a message has arrived.
+    fn open(name: &str, wake: Rc<dyn Fn()>) -> Line<E> {
+        let mut line = Line { worker: None, inbox: Rc::default(), handlers: None };
+        let options = WorkerOptions::new();
+        options.set_name(name);
+        let worker = match Worker::new_with_options(Self::SCRIPT, &options) {
             Ok(worker) => worker,
             Err(error) => {
                 let sentence = format!("The worker could not be started ({error:?}).");
-                self.inbox.borrow_mut().push_back(Err(sentence));
-                return;
+                line.inbox.borrow_mut().push_back(Err(sentence));
+                return line;
             }
         };
         let deliver = {
-            let (inbox, wake) = (self.inbox.clone(), self.wake.clone());
-            move |event: Result<Event, String>| {
+            let inbox = line.inbox.clone();
+            move |event: Result<E, String>| {
                 inbox.borrow_mut().push_back(event);
                 wake();
             }
@@ -86,13 +69,31 @@ impl Link for WorkerLink {
         });
         worker.set_onmessage(Some(on_message.as_ref().unchecked_ref()));
         worker.set_onerror(Some(on_error.as_ref().unchecked_ref()));
-        self.handlers = Some(Handlers { _on_message: on_message, _on_error: on_error });
-        self.worker = Some(worker);
+        line.handlers = Some(Handlers { _on_message: on_message, _on_error: on_error });
+        line.worker = Some(worker);
+        line
+    }
+
+    fn send(&self, message: &impl Serialize) {
+        let Some(worker) = &self.worker else { return };
+        let buffer = Uint8Array::from(&encode(message)[..]).buffer();
+        if let Err(error) = worker.post_message_with_transfer(&buffer, &Array::of1(&buffer)) {
+            self.inbox.borrow_mut().push_back(Err(format!("The worker could not be reached ({error:?}).")));
+        }
+    }
+
+    /// The next message; after a failure the worker is gone.
+    fn receive(&mut self) -> Option<Result<E, String>> {
+        let event = self.inbox.borrow_mut().pop_front()?;
+        if event.is_err() {
+            self.close();
+        }
+        Some(event)
     }
 }
 
-impl WorkerLink {
-    fn stop(&mut self) {
+impl<E> Line<E> {
+    fn close(&mut self) {
         if let Some(worker) = self.worker.take() {
             worker.set_onmessage(None);
             worker.set_onerror(None);
@@ -101,10 +102,128 @@ impl WorkerLink {
     }
 }
 
-/// The worker's end: runs a session until the page ends it.
+impl<E> Drop for Line<E> {
+    fn drop(&mut self) {
+        self.close();
+    }
+}
+
+/// The page's end of the session.
+pub struct WorkerLink {
+    wake: Rc<dyn Fn()>,
+    line: Line<Event>,
+}
+
+impl WorkerLink {
+    /// Starts the worker; `wake` is called when an event has arrived.
+    pub fn new(wake: impl Fn() + 'static) -> WorkerLink {
+        let wake: Rc<dyn Fn()> = Rc::new(wake);
+        WorkerLink { line: Line::open(SESSION, wake.clone()), wake }
+    }
+}
+
+impl Link for WorkerLink {
+    fn send(&mut self, command: &Command) {
+        self.line.send(command);
+    }
+
+    fn receive(&mut self) -> Option<Result<Event, String>> {
+        self.line.receive()
+    }
+
+    fn restart(&mut self) {
+        self.line = Line::open(SESSION, self.wake.clone());
+    }
+}
+
+/// A pool of workers, one for each core but that of the session.
+pub fn worker_pool(wake: impl Fn() + 'static) -> Pool {
+    let wake: Rc<dyn Fn()> = Rc::new(wake);
+    let cores = web_sys::window().map_or(1.0, |window| window.navigator().hardware_concurrency());
+    Pool::new((cores as usize).saturating_sub(1), move || {
+        Box::new(WorkerHand { wake: wake.clone(), line: None, is_ready: false, next: None })
+    })
+}
+
+/// A worker that does tasks.
+struct WorkerHand {
+    wake: Rc<dyn Fn()>,
+    line: Option<Line<TaskEvent>>,
+    is_ready: bool,
+    /// A task for when the worker listens.
+    next: Option<Task>,
+}
+
+impl Hand for WorkerHand {
+    fn begin(&mut self, task: &Task) {
+        let line = self.line.get_or_insert_with(|| Line::open(TASKS, self.wake.clone()));
+        if self.is_ready {
+            line.send(task);
+        } else {
+            self.next = Some(task.clone());
+        }
+    }
+
+    fn receive(&mut self) -> Option<Result<TaskEvent, String>> {
+        let line = self.line.as_mut()?;
+        let event = line.receive()?;
+        if let (Ok(TaskEvent::Ready), Some(task)) = (&event, self.next.take()) {
+            self.is_ready = true;
+            line.send(&task);
+        }
+        Some(event)
+    }
+
+    /// A worker at work hears nothing: it is ended, and the next task gets a new one.
+    fn stop(&mut self) {
+        (self.line, self.is_ready, self.next) = (None, false, None);
+    }
+}
+
+/// The worker's end: what its name says.
 pub fn run() {
     console_error_panic_hook::set_once();
     let scope: DedicatedWorkerGlobalScope = js_sys::global().unchecked_into();
+    if scope.name() == TASKS { do_tasks(scope) } else { run_session(scope) }
+}
+
+fn post(scope: &DedicatedWorkerGlobalScope, event: &impl Serialize) {
+    let buffer = Uint8Array::from(&encode(event)[..]).buffer();
+    // It fails only for values that cannot be transferred, and a buffer can.
+    let _ = scope.post_message_with_transfer(&buffer, &Array::of1(&buffer));
+}
+
+/// Does one task after another until the page ends it.
+fn do_tasks(scope: DedicatedWorkerGlobalScope) {
+    let clock = scope.performance().expect("every worker has a clock");
+    let listener = scope.clone();
+    let on_message = Closure::<dyn Fn(MessageEvent)>::new(move |message: MessageEvent| {
+        let scope = &scope;
+        let now = || clock.now();
+        // News of progress at most twenty times a second.
+        let told = Cell::new(now());
+        let mut progress = |done: f64| {
+            if now() - told.get() > 50.0 {
+                told.set(now());
+                post(scope, &TaskEvent::Progress(done as f32));
+            }
+            true
+        };
+        let task: Result<Task, String> = decode(&Uint8Array::new(&message.data()).to_vec());
+        let outcome = task.and_then(|task| task.run(&now, &mut progress));
+        match outcome {
+            Ok(Some(outcome)) => post(scope, &TaskEvent::Done(Box::new(outcome))),
+            Ok(None) => {}
+            Err(sentence) => post(scope, &TaskEvent::Failed(sentence)),
+        }
+    });
+    listener.set_onmessage(Some(on_message.as_ref().unchecked_ref()));
+    on_message.forget();
+    post(&listener, &TaskEvent::Ready);
+}
+
+/// Runs a session until the page ends it.
+fn run_session(scope: DedicatedWorkerGlobalScope) {
     let channel = MessageChannel::new().expect("every browser with workers has message channels");
     let driver = Rc::new(Driver {
         clock: scope.performance().expect("every worker has a clock"),
@@ -132,13 +251,13 @@ pub fn run() {
     let on_message = Closure::<dyn Fn(MessageEvent)>::new(move |message: MessageEvent| {
         match decode(&Uint8Array::new(&message.data()).to_vec()) {
             Ok(command) => receiver.session.borrow_mut().handle(command),
-            Err(sentence) => receiver.post(&Event::Refused(sentence)),
+            Err(sentence) => post(&receiver.scope, &Event::Refused(sentence)),
         }
         receiver.come_back();
     });
     driver.scope.set_onmessage(Some(on_message.as_ref().unchecked_ref()));
     on_message.forget();
-    driver.post(&Event::Ready { protocol: PROTOCOL });
+    post(&driver.scope, &Event::Ready { protocol: PROTOCOL });
 }
 
 /// Gives the session its turns: between two of them the browser delivers the page's commands.
@@ -153,16 +272,10 @@ struct Driver {
 }
 
 impl Driver {
-    fn post(&self, event: &Event) {
-        let buffer = Uint8Array::from(&encode(event)[..]).buffer();
-        // It fails only for values that cannot be transferred, and a buffer can.
-        let _ = self.scope.post_message_with_transfer(&buffer, &Array::of1(&buffer));
-    }
-
     fn advance(&self) {
         let pace = self.session.borrow_mut().advance(&|| self.clock.now());
         for event in self.session.borrow_mut().events() {
-            self.post(&event);
+            post(&self.scope, &event);
         }
         match pace {
             Pace::Now => self.come_back(),

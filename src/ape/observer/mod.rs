@@ -3,14 +3,17 @@
 //! An observer model is one file here and one line in [`OBSERVERS`]; the page's menus, the command line and
 //! the tests read that table.
 
+mod history;
 mod occupancy;
 mod replay;
 mod uniform;
 
 use rand::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
-use serde::{Deserialize, Serialize};
 
+pub use history::Posterior;
+
+use super::choice::{Choice, Model, Parameter};
 use super::demonstrate::{Demonstrator, Episode};
 use super::{Contexts, Ensemble};
 use crate::mdp::Grid;
@@ -20,8 +23,26 @@ pub trait Observer: Send {
     /// An ensemble episode was played by `context`, through the cells `states`.
     fn saw(&mut self, _context: usize, _states: &[u32]) {}
 
-    /// p(c|s) as the observer has it now.
+    /// p(c|s) as the observer has it now; of one with a memory, at the start of an episode.
     fn contexts(&mut self, grid: &Grid, ensemble: &Ensemble, horizon: u32) -> Contexts;
+
+    /// What it makes of the clone's own episode, where it has a memory.
+    fn memory(&self, _ensemble: &Ensemble) -> Option<Box<dyn Memory>> {
+        None
+    }
+}
+
+/// p(c|τ): who is taken to act, given the episode so far (paper, Eq. for sequential observers). What is
+/// remembered between two steps is a row of numbers.
+pub trait Memory: Send + Sync {
+    /// What is remembered before an episode's first cell.
+    fn start(&self) -> Vec<f64>;
+
+    /// Takes a cell in and writes p(c|τ), `[n]`.
+    fn see(&self, memory: &mut [f64], state: usize, p: &mut [f64]);
+
+    /// Takes in the action that followed.
+    fn act(&self, _memory: &mut [f64], _state: usize, _action: usize) {}
 }
 
 /// A line of the table: an observer model and what is said of it.
@@ -36,62 +57,43 @@ pub struct ObserverModel {
     pub parameter: Option<Parameter>,
     /// Whether it must see ensemble episodes before it knows anything.
     pub learns: bool,
+    /// Whether p(c|·) depends on the episode so far, not on the cell alone.
+    pub remembers: bool,
     build: fn(&Grid, usize, u32) -> Box<dyn Observer>,
 }
 
-pub struct Parameter {
-    pub meaning: &'static str,
-    pub default: u32,
-    pub low: u32,
-    pub high: u32,
-}
-
 /// Every observer model.
-pub static OBSERVERS: [ObserverModel; 3] = [uniform::MODEL, occupancy::MODEL, replay::MODEL];
+pub static OBSERVERS: [ObserverModel; 4] = [uniform::MODEL, occupancy::MODEL, replay::MODEL, history::MODEL];
+
+impl Model for ObserverModel {
+    const WHAT: &'static str = "observer";
+
+    fn table() -> &'static [Self] {
+        &OBSERVERS
+    }
+
+    fn name(&self) -> &'static str {
+        self.name
+    }
+
+    fn parameter(&self) -> Option<&Parameter> {
+        self.parameter.as_ref()
+    }
+}
 
 /// An observer model with its parameter, as `uniform`, `occupancy` or `replay(60)`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(try_from = "String", into = "String")]
-pub struct ObserverChoice {
-    index: u32,
-    parameter: u32,
-}
+pub type ObserverChoice = Choice<ObserverModel>;
 
 impl ObserverChoice {
     /// Our default.
-    pub const UNIFORM: ObserverChoice = ObserverChoice { index: 0, parameter: 0 };
+    pub const UNIFORM: ObserverChoice = Choice::at(0, 0);
     /// The honest cloner with infinite demonstrations.
-    pub const OCCUPANCY: ObserverChoice = ObserverChoice { index: 1, parameter: 0 };
+    pub const OCCUPANCY: ObserverChoice = Choice::at(1, 0);
     /// The paper's estimate.
-    pub const PAPER: ObserverChoice = ObserverChoice { index: 2, parameter: 60 };
-
-    /// Every model, each with its default parameter.
-    pub fn all() -> impl Iterator<Item = ObserverChoice> {
-        OBSERVERS.iter().enumerate().map(|(index, model)| ObserverChoice {
-            index: index as u32,
-            parameter: model.parameter.as_ref().map_or(0, |parameter| parameter.default),
-        })
-    }
-
-    pub fn model(&self) -> &'static ObserverModel {
-        &OBSERVERS[self.index as usize]
-    }
-
-    /// The number in parentheses; 0 for a model that takes none.
-    pub fn parameter(&self) -> u32 {
-        self.parameter
-    }
-
-    /// The same model with another number, brought into its range; the same choice for a model without one.
-    pub fn with_parameter(self, parameter: u32) -> ObserverChoice {
-        match &self.model().parameter {
-            Some(range) => ObserverChoice { parameter: parameter.clamp(range.low, range.high), ..self },
-            None => self,
-        }
-    }
+    pub const PAPER: ObserverChoice = Choice::at(2, 60);
 
     pub fn build(&self, grid: &Grid, experts: usize) -> Box<dyn Observer> {
-        (self.model().build)(grid, experts, self.parameter)
+        (self.model().build)(grid, experts, self.parameter())
     }
 
     /// p(c|s) of this observer for an ensemble that changes no more. A model that learns watches fresh
@@ -104,7 +106,7 @@ impl ObserverChoice {
             let mut rng = Xoshiro256PlusPlus::seed_from_u64(u64::from(seed));
             let mut episode = Episode::default();
             let mut steps = 0;
-            for _ in 0..self.parameter as usize * grid.starts().len() {
+            for _ in 0..self.parameter() as usize * grid.starts().len() {
                 let context = demonstrator.play(&mut episode, &mut rng);
                 observer.saw(context, &episode.states);
                 steps += episode.states.len();
@@ -114,66 +116,6 @@ impl ObserverChoice {
             }
         }
         observer.contexts(grid, ensemble, horizon)
-    }
-}
-
-impl std::fmt::Display for ObserverChoice {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self.model().parameter {
-            Some(_) => write!(f, "{}({})", self.model().name, self.parameter),
-            None => f.write_str(self.model().name),
-        }
-    }
-}
-
-impl From<ObserverChoice> for String {
-    fn from(choice: ObserverChoice) -> String {
-        choice.to_string()
-    }
-}
-
-/// Text that names no observer model.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("observer {text:?}: must be one of {known}")]
-pub struct ObserverError {
-    text: String,
-    known: String,
-}
-
-impl std::str::FromStr for ObserverChoice {
-    type Err = ObserverError;
-
-    fn from_str(text: &str) -> Result<Self, ObserverError> {
-        let (name, argument) = match text.strip_suffix(')').and_then(|text| text.split_once('(')) {
-            Some((name, argument)) => (name, Some(argument)),
-            None => (text, None),
-        };
-        let parse = || {
-            let default = ObserverChoice::all().find(|choice| choice.model().name == name)?;
-            match (&default.model().parameter, argument) {
-                (_, None) => Some(default),
-                (None, Some(_)) => None,
-                (Some(range), Some(argument)) => {
-                    let parameter = argument.parse().ok().filter(|value| (range.low..=range.high).contains(value))?;
-                    Some(ObserverChoice { parameter, ..default })
-                }
-            }
-        };
-        parse().ok_or_else(|| {
-            let known = OBSERVERS.iter().map(|model| match &model.parameter {
-                Some(p) => format!("{}({}), {} to {}", model.name, p.meaning, p.low, p.high),
-                None => model.name.to_owned(),
-            });
-            ObserverError { text: text.to_owned(), known: known.collect::<Vec<_>>().join("; ") }
-        })
-    }
-}
-
-impl TryFrom<String> for ObserverChoice {
-    type Error = ObserverError;
-
-    fn try_from(text: String) -> Result<Self, ObserverError> {
-        text.parse()
     }
 }
 
@@ -197,7 +139,7 @@ mod tests {
         for bad in ["", "bayes", "replay(0)", "replay(x)", "uniform(3)", "replay(60", "replay(99999)"] {
             let sentence = bad.parse::<ObserverChoice>().unwrap_err().to_string();
             assert!(
-                sentence.contains("uniform; occupancy; replay(contexts kept at each cell), 1 to 1000"),
+                sentence.contains("uniform; occupancy; replay(contexts kept at each cell), 1 to 1000; history"),
                 "{sentence}"
             );
         }

@@ -11,6 +11,7 @@ pub const MODEL: ObserverModel = ObserverModel {
               cloning with infinitely many demonstrations.",
     parameter: None,
     learns: false,
+    remembers: false,
     build: |_, _, _| Box::new(OccupancyShare),
 };
 

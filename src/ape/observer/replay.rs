@@ -1,6 +1,7 @@
 //! `replay(k)`: p(c|s) = share of c among the last k contexts that ensemble episodes left at s.
 
-use super::{Observer, ObserverModel, Parameter};
+use super::{Observer, ObserverModel};
+use crate::ape::choice::Parameter;
 use crate::ape::{Contexts, Ensemble};
 use crate::mdp::Grid;
 
@@ -11,6 +12,7 @@ pub const MODEL: ObserverModel = ObserverModel {
               appendix); 1/n where there are none yet.",
     parameter: Some(Parameter { meaning: "contexts kept at each cell", default: 60, low: 1, high: 1000 }),
     learns: true,
+    remembers: false,
     build: |grid, experts, kept| Box::new(Replay::new(grid.cells(), experts, kept as usize)),
 };
 

@@ -10,6 +10,7 @@ pub const MODEL: ObserverModel = ObserverModel {
     summary: "p(c|s) = 1/n everywhere: asks a random expert at each cell, as with equally many labels from each.",
     parameter: None,
     learns: false,
+    remembers: false,
     build: |_, _, _| Box::new(Uniform),
 };
 

@@ -1,12 +1,15 @@
-//! The command line: `ape evaluate`, `ape train`, `ape presets`.
+//! The command line: `ape evaluate`, `train` and `presets` here, `attack`, `table1`, `sweep` and `results` in
+//! `experiments`.
 //!
-//! Results go to standard output as JSON. Bad input gets one line on standard error and exit code 2.
+//! Results go to standard output. Bad input gets one line on standard error and exit code 2.
+
+mod experiments;
 
 use std::path::Path;
 use std::process::ExitCode;
 
-use ape_lab::ape::{EnsembleFile, FIELDS, Field, Figures, Trainer};
-use ape_lab::experiment::{CurvePoint, PRESETS, Preset, Setup};
+use ape_lab::ape::{Ensemble, EnsembleFile, FIELDS, Field, Figures, Trainer};
+use ape_lab::experiment::{CurvePoint, Denied, PRESETS, Preset, Setup};
 use ape_lab::mdp::{Grid, HORIZON, Returns};
 use clap::{Arg, ArgMatches, Command};
 use serde::Serialize;
@@ -23,6 +26,10 @@ fn main() -> ExitCode {
     let outcome = match matches.subcommand() {
         Some(("evaluate", matches)) => evaluate(matches),
         Some(("train", matches)) => train(matches),
+        Some(("attack", matches)) => experiments::attack(matches),
+        Some(("table1", matches)) => experiments::table1(matches),
+        Some(("sweep", matches)) => experiments::sweep(matches),
+        Some(("results", matches)) => experiments::results(matches),
         _ => presets(),
     };
     match outcome {
@@ -46,19 +53,12 @@ fn usage_sentence(error: &clap::Error) -> String {
 
 fn command() -> Command {
     let file = |name: &'static str, help: &'static str| Arg::new(name).long(name).value_name("FILE").help(help);
-    let mut train = Command::new("train")
-        .about("Train an ensemble with PG-APE; prints its figures as JSON")
-        .arg(Arg::new("preset").long("preset").value_name("NAME").help("Start from a preset (see ape presets)"))
-        .arg(file("config", "Start from a file: fields as below, with an optional grid; or an ensemble file"))
+    let train = Command::new("train")
+        .about("Train an ensemble; prints its figures as JSON")
         .arg(file("out", "Write the ensemble to this file"))
         .arg(file("curve", "Write the figures after every update to this CSV file"));
-    for field in &FIELDS {
-        let flag = field.name.replace('_', "-");
-        let argument = Arg::new(field.name).long(flag).value_name("VALUE").allow_hyphen_values(true);
-        train = train.arg(argument.help(field.tip()));
-    }
-    Command::new("ape")
-        .about("Adversarial policy ensembles: train them, evaluate them")
+    let mut command = Command::new("ape")
+        .about("Adversarial policy ensembles: train them, evaluate them, attack them")
         .version(env!("CARGO_PKG_VERSION"))
         .subcommand_required(true)
         .subcommand(
@@ -66,12 +66,38 @@ fn command() -> Command {
                 .about("Exact figures of an ensemble file, as JSON")
                 .arg(Arg::new("file").value_name("FILE").required(true)),
         )
-        .subcommand(train)
-        .subcommand(Command::new("presets").about("List the presets"))
+        .subcommand(with_setup(train, &[]));
+    for experiment in experiments::commands() {
+        command = command.subcommand(experiment);
+    }
+    command.subcommand(Command::new("presets").about("List the presets"))
 }
 
+/// Adds the flags that say what a run starts from, but those of the fields in `without`.
+fn with_setup(command: Command, without: &[&str]) -> Command {
+    let command = command
+        .arg(Arg::new("preset").long("preset").value_name("NAME").help("Start from a preset (see ape presets)"))
+        .arg(
+            Arg::new("config")
+                .long("config")
+                .value_name("FILE")
+                .help("Start from a file: fields as below, with an optional grid; or an ensemble file"),
+        );
+    FIELDS.iter().filter(|field| !without.contains(&field.name)).fold(command, |command, field| {
+        let flag = field.name.replace('_', "-");
+        let argument = Arg::new(field.name).long(flag).value_name("VALUE").allow_hyphen_values(true);
+        command.arg(argument.help(field.tip()))
+    })
+}
+
+/// The text of a file, which is no longer than an ensemble can be.
 fn read(file: &str) -> Result<String, String> {
-    std::fs::read_to_string(file).map_err(|error| format!("{file}: {error}"))
+    let sentence = |error: std::io::Error| format!("{file}: {error}");
+    let length = std::fs::metadata(file).map_err(sentence)?.len();
+    if length > EnsembleFile::LONGEST as u64 {
+        return Err(format!("{file}: {length} bytes: expected at most {} MB", EnsembleFile::LONGEST / 1_000_000));
+    }
+    std::fs::read_to_string(file).map_err(sentence)
 }
 
 /// Writes a file whole or not at all.
@@ -91,13 +117,18 @@ fn print(result: &impl Serialize) -> Result<(), String> {
     Ok(())
 }
 
-fn evaluate(matches: &ArgMatches) -> Result<(), String> {
+/// The grid and the ensemble of the file that is named, and the T it was trained with.
+fn ensemble_file(matches: &ArgMatches) -> Result<(Grid, Ensemble, u32), String> {
     let file = matches.get_one::<String>("file").expect("clap requires it");
     let in_file = |error| format!("{file}: {error}");
     let parsed = EnsembleFile::parse(&read(file)?).map_err(|error| in_file(error.to_string()))?;
-    // The T it was trained with, where the file says so.
     let horizon = parsed.config.as_ref().map_or(HORIZON, |config| config.horizon);
     let (grid, ensemble) = parsed.check().map_err(|error| in_file(error.to_string()))?;
+    Ok((grid, ensemble, horizon))
+}
+
+fn evaluate(matches: &ArgMatches) -> Result<(), String> {
+    let (grid, ensemble, horizon) = ensemble_file(matches)?;
     print(&Figures::of(&grid, &ensemble, horizon))
 }
 
@@ -124,7 +155,8 @@ fn setup(matches: &ArgMatches) -> Result<Setup, String> {
         return Err("this preset is a given ensemble: there is nothing to train".to_owned());
     }
     for field in &FIELDS {
-        if let Some(value) = text(field.name) {
+        // A command without a flag for a field has none to ask for.
+        if let Some(value) = matches.try_get_one::<String>(field.name).ok().flatten() {
             field.set(&mut setup.config, value).map_err(|error| flag_sentence(field, &error.to_string()))?;
         }
     }
@@ -142,8 +174,13 @@ struct Trained {
     /// Hash of all parameters: equal runs share it, on every machine.
     digest: String,
     observer: String,
+    /// β at the end, which `alpha` may have moved.
+    beta: f64,
     /// Returns of the clone by the run's own observer.
     clone: Returns,
+    /// With an `adversary_reward`: what an expert and the clone collect of it within T, mean over starts.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    denied: Option<Denied>,
     #[serde(flatten)]
     figures: Figures,
 }
@@ -169,11 +206,14 @@ fn train(matches: &ArgMatches) -> Result<(), String> {
     if let Some(file) = curve_file {
         write(file, &(curve.join("\n") + "\n"))?;
     }
+    let point = CurvePoint::of(&mut trainer);
     print(&Trained {
         updates: trainer.updates(),
         digest: format!("{:016x}", trainer.digest()),
         observer: config.observer.to_string(),
-        clone: CurvePoint::of(&mut trainer).clone,
+        beta: point.beta,
+        clone: point.clone,
+        denied: point.denied,
         figures: Figures::of(&grid, &ensemble, horizon),
     })
 }

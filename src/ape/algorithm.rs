@@ -1,0 +1,141 @@
+//! What training algorithms have in common, and [`Trainer`], a run by any of them.
+
+use std::hash::Hasher;
+
+use super::exact_ape::ExactApe;
+use super::pg_ape::PgApe;
+use super::{AlgorithmKind, Config, ConfigError, Contexts, Ensemble};
+use crate::mdp::{ACTIONS, Grid, Policy};
+
+/// A training algorithm at work.
+pub trait Algorithm: Send {
+    fn grid(&self) -> &Grid;
+    fn config(&self) -> &Config;
+    /// β for the updates to come; must lie in its range.
+    fn set_beta(&mut self, beta: f64);
+    fn updates(&self) -> u32;
+    /// The experts as they are now.
+    fn ensemble(&self) -> Ensemble;
+    /// p(c|s) of the run's observer as it stands.
+    fn contexts(&mut self) -> Contexts;
+    /// All that is learned.
+    fn parameters(&self) -> [&[f64]; 2];
+    /// One update; returns the ensemble's return within T steps before it, mean over starts, as it was seen.
+    fn update(&mut self) -> f64;
+}
+
+/// A training run.
+pub struct Trainer {
+    algorithm: Box<dyn Algorithm>,
+}
+
+impl Trainer {
+    /// A run at its start.
+    pub fn new(grid: Grid, config: Config) -> Result<Trainer, ConfigError> {
+        config.check()?;
+        config.check_on(&grid)?;
+        let algorithm: Box<dyn Algorithm> = match config.algorithm {
+            AlgorithmKind::PgApe => Box::new(PgApe::new(grid, config)),
+            AlgorithmKind::Exact => Box::new(ExactApe::new(grid, config)),
+        };
+        Ok(Trainer { algorithm })
+    }
+
+    pub fn grid(&self) -> &Grid {
+        self.algorithm.grid()
+    }
+
+    pub fn config(&self) -> &Config {
+        self.algorithm.config()
+    }
+
+    /// Updates made so far.
+    pub fn updates(&self) -> u32 {
+        self.algorithm.updates()
+    }
+
+    /// β for the updates to come.
+    pub fn set_beta(&mut self, beta: f64) -> Result<(), ConfigError> {
+        Config { beta, ..self.config().clone() }.check()?;
+        self.algorithm.set_beta(beta);
+        Ok(())
+    }
+
+    /// The experts as they are now.
+    pub fn ensemble(&self) -> Ensemble {
+        self.algorithm.ensemble()
+    }
+
+    /// p(c|s) of the run's observer as it stands; of one with a memory, at the start of an episode.
+    pub fn contexts(&mut self) -> Contexts {
+        self.algorithm.contexts()
+    }
+
+    /// A number that two runs share only when all their parameters agree to the last bit.
+    pub fn digest(&self) -> u64 {
+        let mut hash = fnv::FnvHasher::default();
+        for parameter in self.algorithm.parameters().concat() {
+            hash.write(&parameter.to_bits().to_le_bytes());
+        }
+        hash.finish()
+    }
+
+    /// One update of the experts; with `alpha`, one of β after it.
+    pub fn update(&mut self) {
+        /// Share of a run after which β begins to follow: the constraint means nothing to experts who are still
+        /// learning to walk, and experts that were never parted by a large β do not part under a small one.
+        const WARM_UP: f64 = 0.4;
+        let ensemble_return = self.algorithm.update();
+        let updates = f64::from(self.updates()) / f64::from(self.config().updates());
+        if let Some(alpha) = self.config().alpha.filter(|_| updates > WARM_UP) {
+            // Returns are told as means over all free cells, the goal included.
+            let grid = self.grid();
+            let found = ensemble_return * grid.starts().len() as f64 / grid.free_cells() as f64;
+            let beta = dual_ascent(self.config().beta, found, alpha);
+            self.algorithm.set_beta(beta);
+        }
+    }
+}
+
+/// Dual ascent for Eq. 2, min E[clone] subject to E[ensemble] ≥ α. With the multiplier 1/β on the constraint
+/// the objective is Eq. 3 up to a factor; where the ensemble is better than it must be β may grow, where it is
+/// worse β must shrink. The step is taken on log β, in units of |α|, so that β stays positive.
+fn dual_ascent(beta: f64, ensemble_return: f64, alpha: f64) -> f64 {
+    const RATE: f64 = 0.05;
+    const LEAST: f64 = 0.01;
+    let slack = ((ensemble_return - alpha) / alpha.abs()).clamp(-1.0, 1.0);
+    (beta.max(LEAST) * libm::exp(RATE * slack)).clamp(LEAST, Config::MAX_BETA)
+}
+
+/// The experts of a table of logits, `[n][S][5]`: π(a) = exp θ_a / Σ exp θ, the same bits on every machine.
+pub fn softmax(logits: &[f64], cells: usize) -> Ensemble {
+    let row = |logits: &[f64; ACTIONS]| {
+        let top = logits.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let weights = logits.map(|logit| libm::exp(logit - top));
+        let sum: f64 = weights.iter().sum();
+        weights.map(|weight| weight / sum)
+    };
+    let rows: Vec<[f64; ACTIONS]> = logits.as_chunks().0.iter().map(row).collect();
+    Ensemble::new(rows.chunks(cells).map(|rows| Policy::from_rows(rows.to_vec())).collect())
+}
+
+/// Adds `weight` times the gradient of the mean entropy of the policies where they went: `visited` is the share
+/// of visits to the pair (context, state) of this number.
+pub fn add_entropy_bonus(ensemble: &Ensemble, weight: f64, visited: impl Fn(usize) -> f64, gradient: &mut [f64]) {
+    if weight == 0.0 {
+        return;
+    }
+    let cells = ensemble.policies()[0].rows().len();
+    for (pair, gradient) in gradient.as_chunks_mut::<ACTIONS>().0.iter_mut().enumerate() {
+        let visited = visited(pair);
+        if visited == 0.0 {
+            continue;
+        }
+        let pi = ensemble.policies()[pair / cells].row(pair % cells);
+        let log = pi.map(|p| if p > 0.0 { libm::log(p) } else { 0.0 });
+        let entropy: f64 = -pi.iter().zip(&log).map(|(p, log)| p * log).sum::<f64>();
+        for b in 0..ACTIONS {
+            gradient[b] -= weight * visited * pi[b] * (log[b] + entropy);
+        }
+    }
+}

@@ -1,0 +1,260 @@
+//! Exact APE: the same objective as PG-APE, climbed by its exact gradient. Nothing is sampled.
+//!
+//! J(θ) = E_{τ ~ π_c}[r(τ)] − β E_{τ ~ π_o}[r(τ)]                                     (paper, Eq. 3)
+//!
+//! undiscounted, over T steps, from every start alike. The expected return of a policy over T steps is a sum
+//! over paths that dynamic programming gives forwards (where it is at step t) and backwards (what is still to
+//! come): their product is the derivative by each π(a|s). The clone mixes the experts by p(c|s), so that its
+//! derivative flows to every expert; with `occupancy`, p(c|s) is itself made of the experts' visits, and that
+//! part of the derivative is once more the return of a policy, for a reward of its own.
+
+use rand::{RngExt, SeedableRng};
+use rand_xoshiro::Xoshiro256PlusPlus;
+
+use super::adam::Adam;
+use super::algorithm::{Algorithm, add_entropy_bonus, softmax};
+use super::observer::ObserverChoice;
+use super::{Config, Contexts, Ensemble};
+use crate::mdp::{ACTIONS, Grid, Policy};
+
+/// A training run by exact gradients.
+pub struct ExactApe {
+    grid: Grid,
+    config: Config,
+    /// θ, `[n][S][5]`.
+    logits: Vec<f64>,
+    adam: Adam,
+    updates: u32,
+    dynamics: Dynamics,
+    /// r̃(s, a), `[S][5]`; −1 everywhere where the clone's reward is the experts'.
+    clone_reward: Vec<[f64; ACTIONS]>,
+}
+
+impl ExactApe {
+    /// Logits at the start lie within this of 0: all alike, the experts would have no reason to part.
+    const SPREAD: f64 = 0.1;
+    const PARTING_BETA: f64 = 0.6;
+    /// Times the entropy bonus of the configuration: exact gradients have no noise of their own that explores.
+    const EXPLORATION: f64 = 20.0;
+
+    /// `config` must have been checked.
+    pub fn new(grid: Grid, config: Config) -> ExactApe {
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(u64::from(config.seed));
+        let entries = config.experts as usize * grid.cells() * ACTIONS;
+        let logits = (0..entries).map(|_| Self::SPREAD * (2.0 * rng.random::<f64>() - 1.0)).collect();
+        let clone_reward = match &config.adversary_reward {
+            Some(reward) => reward.table(&grid),
+            None => vec![[-1.0; ACTIONS]; grid.cells()],
+        };
+        let dynamics = Dynamics::new(&grid, config.horizon);
+        ExactApe { logits, adam: Adam::new(entries), updates: 0, dynamics, clone_reward, grid, config }
+    }
+
+    /// J of the experts as they are, its gradient by the logits `[n][S][5]`, the ensemble's part of J, and how
+    /// often each cell is visited by each expert and by the clone: `[n + 1][S]`.
+    pub fn gradient(&mut self) -> ExactGradient {
+        let ensemble = self.ensemble();
+        let (n, cells) = (ensemble.experts(), self.grid.cells());
+        let beta = self.beta_now();
+        let share = 1.0 / n as f64;
+        let mut by_policy = vec![[0.0; ACTIONS]; n * cells];
+        let mut visits = Vec::with_capacity((n + 1) * cells);
+        let own_reward = vec![[-1.0; ACTIONS]; cells];
+        let mut own = 0.0;
+        for (policy, by_policy) in ensemble.policies().iter().zip(by_policy.chunks_mut(cells)) {
+            own += share * self.dynamics.differentiate(&self.grid, policy, &own_reward, share, by_policy);
+            visits.extend_from_slice(&self.dynamics.visits);
+        }
+        let is_occupancy = self.config.observer == ObserverChoice::OCCUPANCY;
+        let contexts = if is_occupancy {
+            Contexts::from_weights(cells, n, |state, c| visits[c * cells + state])
+        } else {
+            Contexts::equal(cells, n)
+        };
+        let clone = ensemble.cloned(&contexts);
+        let mut by_clone = vec![[0.0; ACTIONS]; cells];
+        let denied = self.dynamics.differentiate(&self.grid, &clone, &self.clone_reward, -beta, &mut by_clone);
+        visits.extend_from_slice(&self.dynamics.visits);
+        for (pair, by_policy) in by_policy.iter_mut().enumerate() {
+            let p = contexts.row(pair % cells)[pair / cells];
+            for (sum, by_clone) in by_policy.iter_mut().zip(&by_clone[pair % cells]) {
+                *sum += p * by_clone;
+            }
+        }
+        if is_occupancy {
+            // ∂J/∂d_c(s) = Σ_a ∂J/∂π_o(a|s) (π_c(a|s) − π_o(a|s)) / Σ_c d_c(s): what a visit is worth.
+            for (c, policy) in ensemble.policies().iter().enumerate() {
+                let worth = |state: usize| {
+                    let all: f64 = (0..n).map(|c| visits[c * cells + state]).sum();
+                    let change = |a: usize| by_clone[state][a] * (policy.row(state)[a] - clone.row(state)[a]);
+                    if all > 0.0 { (0..ACTIONS).map(change).sum::<f64>() / all } else { 0.0 }
+                };
+                let worth: Vec<_> = (0..cells).map(|state| [worth(state); ACTIONS]).collect();
+                self.dynamics.differentiate(&self.grid, policy, &worth, 1.0, &mut by_policy[c * cells..][..cells]);
+            }
+        }
+        let mut logits = vec![0.0; self.logits.len()];
+        for (pair, logits) in logits.as_chunks_mut::<ACTIONS>().0.iter_mut().enumerate() {
+            let pi = ensemble.policies()[pair / cells].row(pair % cells);
+            let mean: f64 = pi.iter().zip(&by_policy[pair]).map(|(p, g)| p * g).sum();
+            for b in 0..ACTIONS {
+                logits[b] = pi[b] * (by_policy[pair][b] - mean);
+            }
+        }
+        ExactGradient { objective: own - beta * denied, ensemble_return: own, logits, visits }
+    }
+
+    /// β of the coming update. For a small β the experts that agree are a local optimum which gradients do not
+    /// leave, while experts that were parted under a large β stay parted under a small one, at a better J. So a
+    /// run starts with β at least [`Self::PARTING_BETA`] and comes down to its own over its first half.
+    fn beta_now(&self) -> f64 {
+        let Config { beta, alpha, exact_updates, .. } = self.config;
+        if beta == 0.0 || alpha.is_some() {
+            return beta;
+        }
+        let done = f64::from(self.updates) / f64::from(exact_updates);
+        beta + (Self::PARTING_BETA - beta).max(0.0) * (1.0 - 2.0 * done).max(0.0)
+    }
+
+    /// Puts logits in the place of the experts', `[n][S][5]`.
+    pub fn set_logits(&mut self, logits: &[f64]) {
+        self.logits.copy_from_slice(logits);
+    }
+
+    pub fn logits(&self) -> &[f64] {
+        &self.logits
+    }
+}
+
+/// J and its exact derivative.
+pub struct ExactGradient {
+    /// J, mean over the cells where episodes start.
+    pub objective: f64,
+    /// Its first term.
+    pub ensemble_return: f64,
+    /// ∂J/∂θ, `[n][S][5]`.
+    pub logits: Vec<f64>,
+    /// Expected visits by every expert, then by the clone, `[n + 1][S]`.
+    visits: Vec<f64>,
+}
+
+impl Algorithm for ExactApe {
+    fn grid(&self) -> &Grid {
+        &self.grid
+    }
+
+    fn config(&self) -> &Config {
+        &self.config
+    }
+
+    fn set_beta(&mut self, beta: f64) {
+        self.config.beta = beta;
+    }
+
+    fn updates(&self) -> u32 {
+        self.updates
+    }
+
+    fn ensemble(&self) -> Ensemble {
+        softmax(&self.logits, self.grid.cells())
+    }
+
+    fn contexts(&mut self) -> Contexts {
+        self.config.observer.contexts(&self.grid, &self.ensemble(), self.config.horizon, 0)
+    }
+
+    fn parameters(&self) -> [&[f64]; 2] {
+        [&self.logits, &[]]
+    }
+
+    fn update(&mut self) -> f64 {
+        let ExactGradient { mut logits, ensemble_return, visits, .. } = self.gradient();
+        let (experts, clone) = visits.split_at(self.config.experts as usize * self.grid.cells());
+        let (all, by_clone) = (experts.iter().sum::<f64>(), clone.iter().sum::<f64>());
+        let n = f64::from(self.config.experts);
+        let visited = |pair: usize| experts[pair] / all + clone[pair % clone.len()] / by_clone / n;
+        let weight = Self::EXPLORATION * self.config.entropy_weight(self.updates);
+        add_entropy_bonus(&self.ensemble(), weight, visited, &mut logits);
+        self.adam.ascend(&mut self.logits, &logits, self.config.learning_rate);
+        self.updates += 1;
+        ensemble_return
+    }
+}
+
+/// T steps of a policy, forwards and backwards; keeps its tables between calls.
+struct Dynamics {
+    horizon: usize,
+    /// What is to come with k steps left, `[T][S]`, k = 0…T − 1.
+    ahead: Vec<f64>,
+    /// Probability of being at a cell now, and a step later, `[S]`.
+    now: Vec<f64>,
+    next: Vec<f64>,
+    /// Expected visits within T steps, `[S]`.
+    visits: Vec<f64>,
+}
+
+impl Dynamics {
+    fn new(grid: &Grid, horizon: u32) -> Dynamics {
+        let (cells, horizon) = (grid.cells(), horizon as usize);
+        let zeros = || vec![0.0; cells];
+        Dynamics { horizon, ahead: vec![0.0; cells * horizon], now: zeros(), next: zeros(), visits: zeros() }
+    }
+
+    /// Expected return of T steps of `policy` for a reward r(s, a), mean over starts; adds `scale` times its
+    /// derivative by π(a|s) to `by_policy`, `[S][5]`.
+    fn differentiate(
+        &mut self,
+        grid: &Grid,
+        policy: &Policy,
+        reward: &[[f64; ACTIONS]],
+        scale: f64,
+        by_policy: &mut [[f64; ACTIONS]],
+    ) -> f64 {
+        let cells = grid.cells();
+        let executed: Vec<_> = grid.starts().iter().map(|&s| grid.executed(policy.row(s as usize))).collect();
+        let expected = |state: usize| -> f64 { (0..ACTIONS).map(|a| policy.row(state)[a] * reward[state][a]).sum() };
+        let immediate: Vec<f64> = grid.starts().iter().map(|&s| expected(s as usize)).collect();
+        // Backwards: what is to come.
+        for k in 1..self.horizon {
+            let (before, after) = self.ahead.split_at_mut(k * cells);
+            let before = &before[(k - 1) * cells..];
+            for ((&state, executed), immediate) in grid.starts().iter().zip(&executed).zip(&immediate) {
+                let to = grid.next(state as usize);
+                let later: f64 = (0..ACTIONS).map(|a| executed[a] * before[to[a] as usize]).sum();
+                after[state as usize] = immediate + later;
+            }
+        }
+        // Forwards: where it is; times what is to come.
+        let means_to = scale * (1.0 - grid.slip());
+        self.visits.fill(0.0);
+        self.now.fill(0.0);
+        for &state in grid.starts() {
+            self.now[state as usize] = 1.0 / grid.starts().len() as f64;
+        }
+        for t in 0..self.horizon {
+            let ahead = &self.ahead[(self.horizon - 1 - t) * cells..][..cells];
+            self.next.fill(0.0);
+            for (&state, executed) in grid.starts().iter().zip(&executed) {
+                let state = state as usize;
+                let here = self.now[state];
+                self.visits[state] += here;
+                for a in 0..ACTIONS {
+                    let to = grid.next(state)[a] as usize;
+                    by_policy[state][a] += means_to * here * ahead[to];
+                    self.next[to] += here * executed[a];
+                }
+            }
+            self.next[grid.goal()] = 0.0;
+            std::mem::swap(&mut self.now, &mut self.next);
+        }
+        let mut total = 0.0;
+        for (&state, immediate) in grid.starts().iter().zip(&immediate) {
+            let state = state as usize;
+            total += self.visits[state] * immediate;
+            for a in 0..ACTIONS {
+                by_policy[state][a] += scale * self.visits[state] * reward[state][a];
+            }
+        }
+        total
+    }
+}

@@ -1,0 +1,159 @@
+//! The sweep over β: what ensemble and clone return for each β and seed; and the paper's table of β.
+
+use serde::{Deserialize, Serialize};
+
+use super::{Setup, Summary};
+use crate::ape::{Config, Trainer};
+use crate::attack::{AttackerChoice, Progress, Target};
+use crate::experiment::bench::ensemble_returns;
+use crate::mdp::{Grid, KnownReturns, RETURN_KINDS, Returns};
+
+/// A run of the sweep at its end.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SweepRun {
+    pub beta: f64,
+    pub seed: u32,
+    pub ensemble: Returns,
+    /// Of the clone by the run's own observer.
+    pub clone: KnownReturns,
+    /// Of the clone that clones the demonstrations.
+    pub occupancy: KnownReturns,
+}
+
+impl SweepRun {
+    /// Trains and evaluates; nothing when told to stop.
+    pub fn run(setup: &Setup, progress: &mut Progress) -> Result<Option<SweepRun>, String> {
+        let grid = Grid::new(setup.grid.clone()).map_err(|error| error.to_string())?;
+        let config = setup.config.clone();
+        let mut trainer = Trainer::new(grid.clone(), config.clone()).map_err(|error| error.to_string())?;
+        for update in 0..config.updates() {
+            trainer.update();
+            if update.is_multiple_of(64) && !progress(f64::from(update) / f64::from(config.updates())) {
+                return Ok(None);
+            }
+        }
+        let ensemble = trainer.ensemble();
+        let target = Target { grid: &grid, ensemble: &ensemble, horizon: config.horizon, seed: config.seed };
+        let clone = |attacker: AttackerChoice| attacker.clone_of(&target, &mut |_| true).map(|clone| clone.returns);
+        let (Some(own), Some(occupancy)) =
+            (clone(AttackerChoice::of(config.observer)), clone(AttackerChoice::OCCUPANCY))
+        else {
+            return Ok(None);
+        };
+        Ok(Some(SweepRun {
+            beta: config.beta,
+            seed: config.seed,
+            ensemble: ensemble_returns(&grid, &ensemble, config.horizon),
+            clone: own,
+            occupancy,
+        }))
+    }
+}
+
+/// The runs of a sweep, in order of β and seed.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Sweep {
+    pub runs: Vec<SweepRun>,
+}
+
+/// All seeds of one β, for one kind of return.
+pub struct SweepPoint {
+    pub beta: f64,
+    pub ensemble: Summary,
+    pub clone: Summary,
+    pub occupancy: Summary,
+}
+
+impl Sweep {
+    /// The β of the paper's table (commented out in its source), with its ensemble and its clone, uncapped: mean and
+    /// standard deviation over 3 seeds.
+    pub const PAPER: [(f64, (f64, f64), (f64, f64)); 4] = [
+        (0.0, (-9.0, 0.0), (-9.0, 0.0)),
+        (0.1, (-9.52, 0.22), (-41.22, 20.41)),
+        (0.2, (-10.06, 0.37), (-144.76, 55.68)),
+        (0.3, (-10.77, 0.68), (-280.0, 106.62)),
+    ];
+
+    /// The setups of all β and seeds.
+    pub fn setups(setup: &Setup, betas: &[f64], seeds: u32) -> Vec<Setup> {
+        let with = |beta, seed| Setup { config: Config { beta, seed, ..setup.config.clone() }, ..setup.clone() };
+        betas.iter().flat_map(|&beta| (1..=seeds).map(move |seed| with(beta, seed))).collect()
+    }
+
+    /// β from `first` to `last` in steps of `step`, as `0:1:0.05`, or a list of them, as `0,0.1,0.6`.
+    pub fn betas(text: &str) -> Result<Vec<f64>, String> {
+        let wrong = || {
+            format!(
+                "betas {text}: must be FIRST:LAST:STEP or a list with commas, each from 0 to {}, at most 1000 of them",
+                Config::MAX_BETA
+            )
+        };
+        let number = |text: &str| text.trim().parse::<f64>().map_err(|_| wrong());
+        let betas = match text.split(':').collect::<Vec<_>>()[..] {
+            [first, last, step] => {
+                let (first, last, step) = (number(first)?, number(last)?, number(step)?);
+                let count = (last - first) / step;
+                if !(step > 0.0 && (0.0..1000.0).contains(&count)) {
+                    return Err(wrong());
+                }
+                // Rounded, so that 0.1 + 0.2 is 0.3.
+                (0..=(count + 1e-9) as u32).map(|i| ((first + f64::from(i) * step) * 1e9).round() / 1e9).collect()
+            }
+            [_] => text.split(',').map(number).collect::<Result<Vec<f64>, String>>()?,
+            _ => return Err(wrong()),
+        };
+        let is_good = |beta: &f64| (0.0..=Config::MAX_BETA).contains(beta);
+        if betas.iter().all(is_good) && betas.len() <= 1000 { Ok(betas) } else { Err(wrong()) }
+    }
+
+    /// One point for each β, for one kind of return (its place in [`RETURN_KINDS`]); a β is left out where the return
+    /// is not known of the clone.
+    pub fn points(&self, kind: usize) -> Vec<SweepPoint> {
+        let mut betas: Vec<f64> = self.runs.iter().map(|run| run.beta).collect();
+        betas.sort_by(f64::total_cmp);
+        betas.dedup();
+        let point = |&beta: &f64| {
+            let runs = || self.runs.iter().filter(|run| run.beta == beta);
+            let own: Vec<f64> = runs().map(|run| (RETURN_KINDS[kind].get)(&run.ensemble)).collect();
+            let clone: Option<Vec<f64>> = runs().map(|run| run.clone.get(kind)).collect();
+            let occupancy: Option<Vec<f64>> = runs().map(|run| run.occupancy.get(kind)).collect();
+            Some(SweepPoint {
+                beta,
+                ensemble: Summary::of(&own)?,
+                clone: Summary::of(&clone?)?,
+                occupancy: Summary::of(&occupancy?)?,
+            })
+        };
+        betas.iter().filter_map(point).collect()
+    }
+
+    /// A line for each run.
+    pub fn csv(&self) -> String {
+        let columns = ["ensemble", "clone", "occupancy"];
+        let names = columns.iter().flat_map(|of| RETURN_KINDS.iter().map(move |kind| format!("{of}_{}", kind.name)));
+        let mut text = format!("beta,seed,{}\n", names.collect::<Vec<_>>().join(","));
+        for run in &self.runs {
+            let values = [KnownReturns::from(run.ensemble), run.clone, run.occupancy];
+            let values = values.iter().flat_map(|returns| {
+                (0..RETURN_KINDS.len()).map(|kind| returns.get(kind).map_or(String::new(), |value| value.to_string()))
+            });
+            text += &format!("{},{},{}\n", run.beta, run.seed, values.collect::<Vec<_>>().join(","));
+        }
+        text
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn betas_are_a_range_or_a_list() {
+        assert_eq!(Sweep::betas("0:1:0.25").unwrap(), [0.0, 0.25, 0.5, 0.75, 1.0]);
+        assert_eq!(Sweep::betas("0:0.3:0.1").unwrap(), [0.0, 0.1, 0.2, 0.3]);
+        assert_eq!(Sweep::betas("0.6, 0").unwrap(), [0.6, 0.0]);
+        for bad in ["", "0:1", "0:1:0", "1:0:0.1", "0:3:1", "a", "0:1:-1", "NaN", "0:1:1e-9", "0:NaN:1"] {
+            assert!(Sweep::betas(bad).unwrap_err().contains("FIRST:LAST:STEP"), "{bad}");
+        }
+    }
+}

@@ -1,0 +1,111 @@
+//! Workers for long experiments: tasks wait in a queue, a hand for each core takes them.
+
+use std::collections::VecDeque;
+
+use super::TaskEvent;
+use crate::experiment::Task;
+
+/// A worker that does one task at a time: a Web Worker or a thread.
+pub trait Hand {
+    /// Begins a task; the last one has ended or was stopped.
+    fn begin(&mut self, task: &Task);
+
+    /// What it has to say, in order; an error when it has died.
+    fn receive(&mut self) -> Option<Result<TaskEvent, String>>;
+
+    /// Gives up the task at hand.
+    fn stop(&mut self);
+}
+
+/// The number of a task, by which its news are told apart.
+pub type TaskId = u32;
+
+/// Tasks, and the hands that do them. Hands are hired when there is work for them.
+pub struct Pool {
+    hire: Box<dyn Fn() -> Box<dyn Hand>>,
+    most: usize,
+    hands: Vec<(Box<dyn Hand>, Option<TaskId>)>,
+    queue: VecDeque<(TaskId, Task)>,
+    begun: TaskId,
+}
+
+impl Pool {
+    /// Most hands there may be, whatever the machine has.
+    pub const MOST: usize = 8;
+
+    /// A pool of at most `cores` hands.
+    pub fn new(cores: usize, hire: impl Fn() -> Box<dyn Hand> + 'static) -> Pool {
+        Pool {
+            hire: Box::new(hire),
+            most: cores.clamp(1, Self::MOST),
+            hands: Vec::new(),
+            queue: VecDeque::new(),
+            begun: 0,
+        }
+    }
+
+    /// Number of hands that work at once.
+    pub fn size(&self) -> usize {
+        self.most
+    }
+
+    /// Puts a task at the end of the queue.
+    pub fn begin(&mut self, task: Task) -> TaskId {
+        self.begun += 1;
+        self.queue.push_back((self.begun, task));
+        self.hand_out();
+        self.begun
+    }
+
+    /// Forgets a task, done or not.
+    pub fn cancel(&mut self, id: TaskId) {
+        self.queue.retain(|(queued, _)| *queued != id);
+        for (hand, busy) in &mut self.hands {
+            if *busy == Some(id) {
+                hand.stop();
+                *busy = None;
+            }
+        }
+        self.hand_out();
+    }
+
+    /// What has been heard, each with its task.
+    pub fn receive(&mut self) -> Vec<(TaskId, TaskEvent)> {
+        let mut news = Vec::new();
+        for (hand, busy) in &mut self.hands {
+            while let Some(event) = hand.receive() {
+                let event = event.unwrap_or_else(|sentence| {
+                    hand.stop();
+                    TaskEvent::Failed(sentence)
+                });
+                // What comes from a task that was cancelled is of no interest.
+                let Some(id) = *busy else { continue };
+                if !matches!(event, TaskEvent::Progress(_)) {
+                    *busy = None;
+                }
+                news.push((id, event));
+            }
+        }
+        self.hand_out();
+        news
+    }
+
+    fn hand_out(&mut self) {
+        while !self.queue.is_empty() {
+            let free = self.hands.iter().position(|(_, busy)| busy.is_none());
+            let free = match free {
+                Some(free) => free,
+                None if self.hands.len() < self.most => {
+                    self.hands.push(((self.hire)(), None));
+                    self.hands.len() - 1
+                }
+                None => return,
+            };
+            if let Some((id, task)) = self.queue.pop_front() {
+                let (hand, busy) = &mut self.hands[free];
+                hand.begin(&task);
+                *busy = Some(id);
+            }
+        }
+    }
+}

@@ -1,0 +1,148 @@
+//! The experiments as tabs of the page: attack bench, Table 1, sweep over β. What they have in common is a batch of
+//! tasks with its progress, and a choice of cloners.
+
+pub mod bench;
+pub mod sweep;
+pub mod table1;
+
+use egui::{ProgressBar, RichText, Ui};
+
+use super::app::App;
+use super::theme::Palette;
+use crate::attack::AttackerChoice;
+use crate::experiment::{Outcome, Task};
+use crate::lab::{Pool, TaskEvent, TaskId};
+
+/// Tasks under way, and what has come of them.
+pub struct Batch {
+    tasks: Vec<(TaskId, f32)>,
+    outcomes: Vec<Option<Outcome>>,
+    /// Seconds on the page's clock.
+    begun: f64,
+    ended: Option<f64>,
+    failure: Option<String>,
+}
+
+impl Batch {
+    pub fn begin(pool: &mut Pool, tasks: Vec<Task>, now: f64) -> Batch {
+        let outcomes = tasks.iter().map(|_| None).collect();
+        let tasks = tasks.into_iter().map(|task| (pool.begin(task), 0.0)).collect();
+        Batch { tasks, outcomes, begun: now, ended: None, failure: None }
+    }
+
+    /// Takes in news of one of its tasks; of others none.
+    pub fn hear(&mut self, id: TaskId, event: &TaskEvent, now: f64) {
+        let Some(index) = self.tasks.iter().position(|(task, _)| *task == id) else { return };
+        match event {
+            TaskEvent::Progress(part) => self.tasks[index].1 = *part,
+            TaskEvent::Done(outcome) => {
+                self.tasks[index].1 = 1.0;
+                self.outcomes[index] = Some((**outcome).clone());
+            }
+            TaskEvent::Failed(sentence) => {
+                self.tasks[index].1 = 1.0;
+                self.failure = Some(sentence.clone());
+            }
+            TaskEvent::Ready => {}
+        }
+        if self.tasks.iter().all(|(_, part)| *part >= 1.0) && (self.failure.is_some() || self.is_complete()) {
+            self.ended = self.ended.or(Some(now));
+        }
+    }
+
+    fn is_complete(&self) -> bool {
+        self.outcomes.iter().all(Option::is_some)
+    }
+
+    pub fn is_running(&self) -> bool {
+        self.ended.is_none()
+    }
+
+    /// What has come so far, in the order of the tasks.
+    pub fn outcomes(&self) -> impl Iterator<Item = &Outcome> {
+        self.outcomes.iter().flatten()
+    }
+
+    pub fn cancel(&mut self, pool: &mut Pool, now: f64) {
+        self.tasks.iter().for_each(|(id, _)| pool.cancel(*id));
+        self.ended = Some(now);
+    }
+
+    /// How far it is, with an estimate and a button that cancels; in the end how long it took.
+    pub fn show(&mut self, ui: &mut Ui, pool: &mut Pool) {
+        let palette = Palette::of(ui);
+        let now = ui.input(|input| input.time);
+        let done = self.tasks.iter().map(|(_, part)| f64::from(*part)).sum::<f64>() / self.tasks.len().max(1) as f64;
+        if let Some(sentence) = &self.failure {
+            ui.label(RichText::new(sentence).color(palette.warning));
+        }
+        if let Some(ended) = self.ended {
+            let seconds = ended - self.begun;
+            let text = match self.outcomes.iter().flatten().count() {
+                _ if self.is_complete() => format!("done in {seconds:.1} s"),
+                count => format!("stopped after {seconds:.1} s with {count} of {} done", self.tasks.len()),
+            };
+            status(ui, &text);
+            return;
+        }
+        ui.horizontal(|ui| {
+            let seconds = now - self.begun;
+            let left = if done > 0.02 && seconds > 0.5 {
+                format!(", about {:.0} s left", (seconds / done - seconds).ceil())
+            } else {
+                String::new()
+            };
+            let workers = match pool.size() {
+                1 => "1 worker".to_owned(),
+                size => format!("{size} workers"),
+            };
+            let text = format!("{:.0} %{left}, {workers}", 100.0 * done);
+            if ui.button("Cancel").clicked() {
+                self.cancel(pool, now);
+            }
+            let bar = ProgressBar::new(done as f32).desired_width(160.0).desired_height(10.0);
+            ui.add(bar.fill(palette.accent)).accessible_name("Progress");
+            status(ui, &text);
+        });
+        ui.ctx().request_repaint_after_secs(0.25);
+    }
+}
+
+fn status(ui: &mut Ui, text: &str) {
+    let label = ui.label(RichText::new(text).small().color(Palette::of(ui).muted));
+    ui.ctx().accesskit_node_builder(label.id, |node| node.set_role(egui::Role::Status));
+}
+
+/// Which of the cloners take part.
+fn choose_cloners(ui: &mut Ui, chosen: &mut Vec<AttackerChoice>) {
+    ui.horizontal_wrapped(|ui| {
+        ui.label(RichText::new("Cloners:").small().color(Palette::of(ui).muted));
+        let usual = AttackerChoice::usual();
+        for &cloner in &usual {
+            let mut is_chosen = chosen.contains(&cloner);
+            let help = format!("{}. {}", cloner.model().title, cloner.model().summary);
+            if ui.checkbox(&mut is_chosen, cloner.to_string()).on_hover_text(help).changed() {
+                // In the order of the table.
+                let keep = |other: &AttackerChoice| if *other == cloner { is_chosen } else { chosen.contains(other) };
+                *chosen = usual.iter().copied().filter(keep).collect();
+            }
+        }
+    });
+}
+
+/// Buttons that give results to the visitor as files.
+fn exports(ui: &mut Ui, app: &mut App, name: &str, csv: impl Fn() -> String, json: impl Fn() -> String) {
+    if ui.button("CSV").on_hover_text("Every run as a table").clicked() {
+        app.save(&format!("{name}.csv"), &csv());
+    }
+    if ui.button("JSON").on_hover_text("Everything, as the command prints it").clicked() {
+        app.save(&format!("{name}.json"), &json());
+    }
+}
+
+/// The first lines of a tab: what it shows.
+fn introduce(ui: &mut Ui, title: &str, text: &str) {
+    ui.label(RichText::new(title).heading());
+    ui.label(RichText::new(text).color(Palette::of(ui).muted));
+    ui.add_space(4.0);
+}

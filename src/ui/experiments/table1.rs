@@ -1,0 +1,141 @@
+//! Table 1 on the page: adversarial ensembles and baselines against every cloner, over seeds.
+
+use egui::{DragValue, RichText, Ui};
+
+use super::{Batch, choose_cloners, exports, introduce};
+use crate::attack::AttackerChoice;
+use crate::experiment::{METHODS, Outcome, Summary, Table1, Task};
+use crate::lab::{TaskEvent, TaskId};
+use crate::mdp::RETURN_KINDS;
+use crate::ui::app::App;
+use crate::ui::numbers;
+use crate::ui::table::{Cell, Column, table};
+use crate::ui::theme::Palette;
+
+/// The tab: what is asked for and what has come of it.
+pub struct Table1Tab {
+    cloners: Vec<AttackerChoice>,
+    seeds: u32,
+    /// The cloners of the batch.
+    columns: Vec<AttackerChoice>,
+    batch: Option<Batch>,
+}
+
+impl Default for Table1Tab {
+    fn default() -> Self {
+        Table1Tab { cloners: AttackerChoice::usual(), seeds: 5, columns: Vec::new(), batch: None }
+    }
+}
+
+impl Table1Tab {
+    pub fn hear(&mut self, id: TaskId, event: &TaskEvent, now: f64) {
+        if let Some(batch) = &mut self.batch {
+            batch.hear(id, event, now);
+        }
+    }
+
+    pub fn show(&mut self, ui: &mut Ui, app: &mut App) {
+        introduce(
+            ui,
+            "Table 1",
+            "The paper's comparison, with the settings at the side and every cloner as a column: adversarial ensembles, plain \
+             policy gradient stopped early to return as much (near-optimal) or to have as bad a clone (random), and two that \
+             are not trained. Mean ± standard deviation over seeds; point at a figure for its 95 % interval.",
+        );
+        choose_cloners(ui, &mut self.cloners);
+        ui.horizontal_wrapped(|ui| {
+            ui.label("Seeds");
+            ui.add(DragValue::new(&mut self.seeds).range(1..=100).speed(0.1)).accessible_name("Seeds");
+            let is_running = self.batch.as_ref().is_some_and(Batch::is_running);
+            if ui.add_enabled(!is_running, egui::Button::new("Make Table 1")).clicked() {
+                let setup = crate::experiment::Setup { ensemble: None, ..app.setup().clone() };
+                self.columns = self.cloners.clone();
+                let task = |setup| Task::Table1 { setup: Box::new(setup), attackers: self.columns.clone() };
+                let tasks = Table1::setups(&setup, self.seeds).into_iter().map(task).collect();
+                self.batch = Some(Batch::begin(&mut app.pool, tasks, ui.input(|input| input.time)));
+            }
+            let made = self.table();
+            if !made.runs.is_empty() {
+                let json = || serde_json::to_string_pretty(&made).unwrap_or_default();
+                exports(ui, app, "ape-table1", || made.csv(), json);
+            }
+        });
+        if let Some(batch) = &mut self.batch {
+            batch.show(ui, &mut app.pool);
+        }
+        let made = self.table();
+        if made.runs.is_empty() {
+            ui.add_space(8.0);
+            let text = "Not made yet. With all cloners it takes about ten seconds a seed.";
+            ui.label(RichText::new(text).color(Palette::of(ui).muted));
+            return;
+        }
+        ui.add_space(4.0);
+        show_table(ui, &made, app.view.kind);
+    }
+
+    /// What has come so far.
+    fn table(&self) -> Table1 {
+        let mut made = Table1::new(self.columns.clone());
+        for outcome in self.batch.iter().flat_map(Batch::outcomes) {
+            if let Outcome::Table1(runs) = outcome {
+                made.runs.extend(runs.iter().cloned());
+            }
+        }
+        made
+    }
+}
+
+fn show_table(ui: &mut Ui, made: &Table1, kind: usize) {
+    /// The return within T, which is known of every clone.
+    const WITHIN_T: usize = 2;
+    let palette = Palette::of(ui);
+    let (rows, within) = (made.rows(kind), made.rows(WITHIN_T));
+    let label = RETURN_KINDS[kind].label;
+    let mut columns =
+        vec![Column::new("method", "How the ensemble came about"), Column::new("ensemble", RETURN_KINDS[kind].help)];
+    columns.extend(made.attackers.iter().map(|cloner| Column::new(&cloner.to_string(), cloner.model().summary)));
+    columns.push(Column::new("paper: ensemble", "The paper's Table 1"));
+    columns.push(Column::new("paper: clone", "The paper's Table 1, by behaviour cloning"));
+    let is_steps = RETURN_KINDS[kind].is_steps;
+    let written = |summary: &Summary, is_steps: bool| {
+        let number = |value: f64| if is_steps { numbers::short(value) } else { numbers::percent(value) };
+        let Summary { mean, sd, low, high, seeds } = *summary;
+        let spread = if is_steps { numbers::short(sd) } else { format!("{:.0} %", 100.0 * sd) };
+        let text = if seeds > 1 { format!("{} ± {spread}", number(mean)) } else { number(mean) };
+        let hover = format!("95 % bootstrap interval {} to {}, {seeds} seeds", number(low), number(high));
+        Cell::number(mean, text).hover(&hover)
+    };
+    let rows = rows.iter().zip(&within).map(|(row, within)| {
+        let method = &METHODS[row.method];
+        let mut cells = vec![
+            Cell::number(row.method as f64, method.title.to_owned()).hover(method.summary),
+            written(&row.ensemble, is_steps),
+        ];
+        for (clone, within) in row.clones.iter().zip(&within.clones) {
+            cells.push(match (clone, within) {
+                (Some(clone), _) => {
+                    let cell = written(clone, is_steps);
+                    let is_lost = is_steps && clone.mean < row.ensemble.mean - 5.0;
+                    if is_lost { cell.colored(palette.clone) } else { cell }
+                }
+                (None, Some(within)) => {
+                    let cell = written(within, true).suffix(" in T");
+                    cell.hover("A clone with a memory has no hitting times to cap: its return within T stands here.")
+                }
+                (None, None) => Cell::number(f64::NEG_INFINITY, "–".to_owned()),
+            });
+        }
+        let paper = |value: Option<(f64, f64)>| match value {
+            Some((mean, sd)) => {
+                Cell::number(mean, format!("{} ± {sd:.2}", numbers::decimal(mean, 2))).colored(palette.muted)
+            }
+            None => Cell::number(f64::NEG_INFINITY, String::new()),
+        };
+        cells.push(paper(method.paper.as_ref().map(|paper| paper.ensemble)));
+        cells.push(paper(method.paper.as_ref().map(|paper| paper.clone)));
+        cells
+    });
+    ui.label(RichText::new(format!("Return ({label}), mean ± sd over seeds")).small().color(palette.muted));
+    table(ui, "table 1", &columns, rows.collect());
+}

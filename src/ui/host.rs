@@ -1,0 +1,29 @@
+//! What the page asks of its surroundings, a browser or a window.
+
+use egui::DroppedFileHandle;
+
+use crate::ape::EnsembleFile;
+
+/// Files, in and out.
+pub trait Host {
+    /// Gives a text to the visitor as a file; the error is a sentence.
+    fn save(&mut self, name: &str, text: &str) -> Result<(), String>;
+
+    /// Asks the visitor for a file; [`Host::opened`] has it later. The error is a sentence.
+    fn ask_for_file(&mut self) -> Result<(), String>;
+
+    /// Reads a file that was dropped on the page; [`Host::opened`] has it later.
+    fn read(&mut self, file: DroppedFileHandle);
+
+    /// A file that the visitor chose: its name, and its text or a sentence.
+    fn opened(&mut self) -> Option<(String, Result<String, String>)>;
+}
+
+/// Refuses a file that is too long before it is read.
+pub fn check_length(bytes: f64) -> Result<(), String> {
+    let longest = EnsembleFile::LONGEST as f64;
+    if bytes <= longest {
+        return Ok(());
+    }
+    Err(format!("a file of {:.0} MB, expected at most {:.0} MB", (bytes / 1e6).ceil(), longest / 1e6))
+}

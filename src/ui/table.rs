@@ -1,0 +1,86 @@
+//! A table of figures that sorts by any of its columns.
+
+use egui::{Color32, Grid, RichText, ScrollArea, Ui};
+
+use super::theme::Palette;
+
+/// A column's head.
+pub struct Column {
+    title: String,
+    help: String,
+}
+
+impl Column {
+    pub fn new(title: &str, help: &str) -> Column {
+        Column { title: title.to_owned(), help: help.to_owned() }
+    }
+}
+
+/// A figure: how it is written, and what it sorts by.
+pub struct Cell {
+    text: String,
+    value: f64,
+    color: Option<Color32>,
+    hover: String,
+}
+
+impl Cell {
+    pub fn number(value: f64, text: String) -> Cell {
+        Cell { text, value, color: None, hover: String::new() }
+    }
+
+    pub fn colored(self, color: Color32) -> Cell {
+        Cell { color: Some(color), ..self }
+    }
+
+    pub fn hover(self, text: &str) -> Cell {
+        Cell { hover: text.to_owned(), ..self }
+    }
+
+    pub fn suffix(mut self, text: &str) -> Cell {
+        self.text += text;
+        self
+    }
+}
+
+/// Draws a table; a click on a column's head sorts by it, another turns the order round.
+pub fn table(ui: &mut Ui, id: &'static str, columns: &[Column], mut rows: Vec<Vec<Cell>>) {
+    let palette = Palette::of(ui);
+    let key = egui::Id::unique((id, "order"));
+    let (mut by, mut is_falling) = ui.data(|data| data.get_temp::<(usize, bool)>(key)).unwrap_or((0, false));
+    by = by.min(columns.len() - 1);
+    rows.sort_by(|a, b| {
+        let order = a[by].value.total_cmp(&b[by].value);
+        if is_falling { order.reverse() } else { order }
+    });
+    ScrollArea::horizontal().id_salt(id).show(ui, |ui| {
+        ui.spacing_mut().button_padding.x = 4.0;
+        Grid::new(id).striped(true).spacing([14.0, 4.0]).min_col_width(0.0).show(ui, |ui| {
+            for (index, column) in columns.iter().enumerate() {
+                let mark = match index == by {
+                    true if is_falling => " ↓",
+                    true => " ↑",
+                    false => "",
+                };
+                let text = RichText::new(format!("{}{mark}", column.title)).small().strong();
+                let response = ui.add(egui::Button::new(text).frame(false));
+                let response = response.accessible_name(format!("Sort by {}", column.title));
+                if response.on_hover_text(&column.help).clicked() {
+                    (by, is_falling) = (index, index == by && !is_falling);
+                    ui.data_mut(|data| data.insert_temp(key, (by, is_falling)));
+                }
+            }
+            ui.end_row();
+            for row in rows {
+                for cell in row {
+                    let text = RichText::new(cell.text).small().color(cell.color.unwrap_or(palette.ink));
+                    let label = ui.add(egui::Label::new(text).extend());
+                    if !cell.hover.is_empty() {
+                        label.on_hover_text(cell.hover);
+                    }
+                }
+                ui.end_row();
+            }
+        });
+    });
+}

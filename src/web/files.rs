@@ -1,0 +1,93 @@
+//! Files of a browser: downloads, a file picker, and files dropped on the page.
+
+use std::cell::RefCell;
+use std::collections::VecDeque;
+use std::rc::Rc;
+
+use egui::DroppedFileHandle;
+use js_sys::Array;
+use wasm_bindgen::prelude::*;
+use wasm_bindgen_futures::{JsFuture, spawn_local};
+use web_sys::{Blob, File, HtmlAnchorElement, HtmlInputElement, Url};
+
+use crate::ui::{Host, check_length};
+
+type Inbox = Rc<RefCell<VecDeque<(String, Result<String, String>)>>>;
+
+/// The browser's files.
+pub struct Files {
+    wake: Rc<dyn Fn()>,
+    inbox: Inbox,
+    picker: Option<(HtmlInputElement, Closure<dyn Fn()>)>,
+}
+
+impl Files {
+    /// `wake` is called when a file has been read.
+    pub fn new(wake: impl Fn() + 'static) -> Files {
+        Files { wake: Rc::new(wake), inbox: Inbox::default(), picker: None }
+    }
+
+    fn pick(&mut self) -> Result<(), JsValue> {
+        let document = web_sys::window().and_then(|window| window.document()).ok_or("no document")?;
+        let input: HtmlInputElement = document.create_element("input")?.unchecked_into();
+        input.set_type("file");
+        input.set_accept(".json,application/json");
+        let (inbox, wake, chosen) = (self.inbox.clone(), self.wake.clone(), input.clone());
+        let on_change = Closure::<dyn Fn()>::new(move || {
+            if let Some(file) = chosen.files().and_then(|files| files.get(0)) {
+                take(file, inbox.clone(), wake.clone());
+            }
+        });
+        input.set_onchange(Some(on_change.as_ref().unchecked_ref()));
+        input.click();
+        // Kept until the next one: the picker may stay open for long.
+        self.picker = Some((input, on_change));
+        Ok(())
+    }
+}
+
+impl Host for Files {
+    fn save(&mut self, name: &str, text: &str) -> Result<(), String> {
+        download(name, text).map_err(|error| format!("{name} could not be saved ({error:?})."))
+    }
+
+    fn ask_for_file(&mut self) -> Result<(), String> {
+        self.pick().map_err(|error| format!("No file can be chosen here ({error:?})."))
+    }
+
+    fn read(&mut self, file: DroppedFileHandle) {
+        if let Some(file) = file.web_file() {
+            take(file.clone(), self.inbox.clone(), self.wake.clone());
+        }
+    }
+
+    fn opened(&mut self) -> Option<(String, Result<String, String>)> {
+        self.inbox.borrow_mut().pop_front()
+    }
+}
+
+/// Reads a file, if it is not too long, and puts it in the inbox.
+fn take(file: File, inbox: Inbox, wake: Rc<dyn Fn()>) {
+    spawn_local(async move {
+        let text = match check_length(file.size()) {
+            Ok(()) => JsFuture::from(file.text())
+                .await
+                .map(|text| text.as_string().unwrap_or_default())
+                .map_err(|error| format!("could not be read ({error:?})")),
+            Err(sentence) => Err(sentence),
+        };
+        inbox.borrow_mut().push_back((file.name(), text));
+        wake();
+    });
+}
+
+fn download(name: &str, text: &str) -> Result<(), JsValue> {
+    let document = web_sys::window().and_then(|window| window.document()).ok_or("no document")?;
+    let blob = Blob::new_with_str_sequence(&Array::of1(&text.into()))?;
+    let address = Url::create_object_url_with_blob(&blob)?;
+    let link: HtmlAnchorElement = document.create_element("a")?.unchecked_into();
+    link.set_href(&address);
+    link.set_download(name);
+    link.click();
+    Url::revoke_object_url(&address)
+}
