@@ -5,8 +5,11 @@ use std::cell::RefCell;
 use std::collections::VecDeque;
 use std::rc::Rc;
 
-use ape_lab::lab::{Command, Event, Link, PROTOCOL, Session};
-use ape_lab::ui::App;
+use ape_lab::ape::EnsembleFile;
+use ape_lab::attack::AttackerChoice;
+use ape_lab::experiment::{Bench, Sweep, Task};
+use ape_lab::lab::{Command, Event, Hand, Link, PROTOCOL, Pool, Session, TaskEvent};
+use ape_lab::ui::{App, Host};
 use egui::accesskit::Role;
 use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT, Queryable};
@@ -60,9 +63,62 @@ impl Link for Here {
     }
 }
 
+/// Does a task while it is begun, and tells of it when asked.
+#[derive(Default)]
+struct AtOnce(VecDeque<TaskEvent>);
+
+impl Hand for AtOnce {
+    fn begin(&mut self, task: &Task) {
+        self.0.push_back(TaskEvent::Progress(0.5));
+        self.0.push_back(match task.run(&|| 0.0, &mut |_| true) {
+            Ok(outcome) => TaskEvent::Done(Box::new(outcome.expect("it was not told to stop"))),
+            Err(sentence) => TaskEvent::Failed(sentence),
+        });
+    }
+
+    fn receive(&mut self) -> Option<Result<TaskEvent, String>> {
+        self.0.pop_front().map(Ok)
+    }
+
+    fn stop(&mut self) {
+        self.0.clear();
+    }
+}
+
+/// A file: its name, and its text or why it could not be read.
+type NamedText = (String, Result<String, String>);
+
+/// Files that the page has saved, and files for it to open.
+#[derive(Clone, Default)]
+struct Desktop {
+    saved: Rc<RefCell<Vec<(String, String)>>>,
+    to_open: Rc<RefCell<Vec<NamedText>>>,
+}
+
+impl Host for Desktop {
+    fn save(&mut self, name: &str, text: &str) -> Result<(), String> {
+        self.saved.borrow_mut().push((name.to_owned(), text.to_owned()));
+        Ok(())
+    }
+
+    fn ask_for_file(&mut self) -> Result<(), String> {
+        Ok(())
+    }
+
+    fn read(&mut self, _file: egui::DroppedFileHandle) {}
+
+    fn opened(&mut self) -> Option<NamedText> {
+        self.to_open.borrow_mut().pop()
+    }
+}
+
 type Page<'a> = Harness<'a, Option<App>>;
 
 fn open<'a>(width: f32, height: f32) -> (Page<'a>, Here) {
+    open_with(width, height, Desktop::default())
+}
+
+fn open_with<'a>(width: f32, height: f32, desktop: Desktop) -> (Page<'a>, Here) {
     let here = Here::new();
     let link = here.clone();
     let mut page = Harness::builder().with_size(egui::vec2(width, height)).build_ui_state(
@@ -73,7 +129,10 @@ fn open<'a>(width: f32, height: f32) -> (Page<'a>, Here) {
                     app.show(ui);
                 }
                 // Fonts and styles hold from the next frame on.
-                None => *app = Some(App::new(ui.ctx(), Box::new(link.clone()))),
+                None => {
+                    let pool = Pool::new(2, || Box::new(AtOnce::default()));
+                    *app = Some(App::new(ui.ctx(), Box::new(link.clone()), pool, Box::new(desktop.clone())));
+                }
             }
         },
         None,
@@ -250,4 +309,131 @@ fn a_refusal_is_shown_until_it_is_dismissed() {
     page.get_by_role_and_label(Role::Button, "Dismiss").click_accesskit();
     page.run_steps(3);
     assert!(page.query_by(|node| says(node).is_some_and(|text| text.contains(refusal))).is_none());
+}
+
+/// Presses the button of this name, then draws a few times.
+fn press(page: &mut Page, name: &str) {
+    page.get_by_role_and_label(Role::Button, name).click_accesskit();
+    page.run_steps(6);
+}
+
+fn go_to(page: &mut Page, tab: &str) {
+    page.get_by_role_and_label(Role::RadioButton, &format!("Tab: {tab}")).click_accesskit();
+    page.run_steps(3);
+}
+
+/// Leaves only the cloners of these names checked.
+fn only(page: &mut Page, cloners: &[&str]) {
+    for cloner in AttackerChoice::usual() {
+        if !cloners.contains(&&*cloner.to_string()) {
+            page.get_by_role_and_label(Role::CheckBox, &cloner.to_string()).click_accesskit();
+            page.step();
+        }
+    }
+}
+
+#[test]
+fn the_bench_attacks_what_is_shown_and_saves_it() {
+    let desktop = Desktop::default();
+    let (mut page, _) = open_with(1280.0, 800.0, desktop.clone());
+    go_to(&mut page, "Attack bench");
+    only(&mut page, &["uniform", "occupancy", "bc_counts(1000000)", "history_k(1)"]);
+    page.get_by_label_contains("learning curve").click_accesskit();
+    page.step();
+    press(&mut page, "Attack the ensemble shown");
+    page.get_by(|node| says(node).is_some_and(|text| text.starts_with("The ensemble after update 732 returns −16.38")));
+    press(&mut page, "CSV");
+    press(&mut page, "JSON");
+    press(&mut page, "Save the ensemble");
+    page.run_steps(3);
+    let saved = desktop.saved.borrow();
+    let names: Vec<&str> = saved.iter().map(|(name, _)| &**name).collect();
+    assert_eq!(names, ["ape-attack.csv", "ape-attack.json", "ape-ensemble.json"]);
+    let bench: Bench = serde_json::from_str(&saved[1].1).unwrap();
+    assert_eq!(saved[0].1.lines().count(), 1 + bench.attackers.len());
+    let drops: Vec<Option<f64>> = bench.attackers.iter().map(|attack| attack.drop).collect();
+    assert!(drops[0] > Some(75.0) && drops[1].unwrap().abs() < 0.01, "{drops:?}");
+    assert!(drops[2].unwrap().abs() < 0.2 && drops[3].is_none(), "{drops:?}");
+    // What was saved is the ensemble, in full.
+    let (grid, ensemble) = EnsembleFile::parse(&saved[2].1).unwrap().check().unwrap();
+    let returns = ape_lab::experiment::ensemble_returns(&grid, &ensemble, 100);
+    assert_eq!(returns.capped_return, bench.ensemble.capped_return);
+}
+
+/// A file that is no ensemble leaves everything as it is and says what is wrong; a good one is shown.
+#[test]
+fn files_are_opened_or_refused_with_a_sentence() {
+    let desktop = Desktop::default();
+    let (mut page, _) = open_with(1280.0, 800.0, desktop.clone());
+    let before = figure(&page, "Ensemble capped");
+    for (text, expected) in [
+        (Ok("{\"format\": \"ape-ense".to_owned()), "bad.json: not an ensemble file: EOF"),
+        (Ok("{\"format\": \"ape-ensemble\", \"version\": 3, \"grid\": {\"rows\": 2, \"cols\": 2, \"goal\": [0, 0]}, \"experts\": []}".to_owned()), "reads version 1"),
+        (Ok("x".repeat(EnsembleFile::LONGEST + 1)), "longer than 10 MB"),
+        (Err("a file of 100 MB, expected at most 10 MB".to_owned()), "bad.json: a file of 100 MB"),
+    ] {
+        desktop.to_open.borrow_mut().push(("bad.json".to_owned(), text));
+        page.run_steps(3);
+        page.get_by(|node| node.role() == Role::Alert || says(node).is_some_and(|text| text.contains(expected)));
+        page.get_by(|node| says(node).is_some_and(|text| text.contains(expected)));
+        assert_eq!(figure(&page, "Ensemble capped"), before);
+        press(&mut page, "Dismiss");
+    }
+    let trap = (ape_lab::experiment::Preset::find("trap").unwrap().setup)().ensemble.unwrap();
+    desktop.to_open.borrow_mut().push(("trap.json".to_owned(), Ok(serde_json::to_string(&trap).unwrap())));
+    settle(&mut page);
+    page.run_steps(20);
+    assert_eq!(figure(&page, "Ensemble capped"), -11.3);
+}
+
+#[test]
+fn the_sweep_and_table_1_are_made_on_the_page() {
+    let desktop = Desktop::default();
+    let (mut page, _) = open_with(1280.0, 800.0, desktop.clone());
+    go_to(&mut page, "β sweep");
+    press(&mut page, "Paper's table");
+    page.run_steps(30);
+    page.get_by(|node| says(node).is_some_and(|text| text == "−144.76 ± 55.68"));
+    press(&mut page, "JSON");
+    let sweep: Sweep = serde_json::from_str(&desktop.saved.borrow().last().unwrap().1).unwrap();
+    assert_eq!((sweep.runs.len(), sweep.runs[0].beta, sweep.runs[11].beta), (12, 0.0, 0.3));
+    go_to(&mut page, "Table 1");
+    only(&mut page, &["uniform", "occupancy"]);
+    page.get_by_role_and_label(Role::SpinButton, "Seeds").set_value_accesskit(2.0);
+    page.run_steps(3);
+    press(&mut page, "Make Table 1");
+    page.run_steps(10);
+    page.get_by(|node| says(node).is_some_and(|text| text == "−44.27 ± 1.07"));
+    press(&mut page, "CSV");
+    // Two seeds of six methods, each with the ensemble and two clones, and the head.
+    assert_eq!(desktop.saved.borrow().last().unwrap().1.lines().count(), 1 + 2 * 6 * 3);
+}
+
+/// A clone that is not quick is made once training rests, and then stands in its panel.
+#[test]
+fn a_slow_clone_can_be_shown_in_a_panel() {
+    let (mut page, here) = open(1280.0, 800.0);
+    page.get_by_role_and_label(Role::ComboBox, "Who clones, panel 2").click_accesskit();
+    page.run_steps(3);
+    page.get_by_label_contains("bc_counts(1000000): behaviour").click_accesskit();
+    page.run_steps(8);
+    assert!(here.0.borrow().commands.contains(&Command::Export));
+    page.get_by(|node| {
+        node.role() == Role::Image && says(node).is_some_and(|text| text.starts_with("Clone (bc_counts(1000000))"))
+    });
+}
+
+#[test]
+fn the_algorithm_can_be_exact_and_brings_its_observer() {
+    let (mut page, _) = open(1280.0, 800.0);
+    page.get_by_label_contains("replay: remembers recent demonstrations").click_accesskit();
+    settle(&mut page);
+    page.get_by_role_and_label(Role::RadioButton, "Algorithm: exact").click_accesskit();
+    page.run_steps(3);
+    settle(&mut page);
+    page.get_by(|node| says(node).is_some_and(|text| text.starts_with("trained, update 1500 of 1500")));
+    page.get_by_label_contains("uniform: weighs the experts").click_accesskit();
+    page.run_steps(3);
+    settle(&mut page);
+    assert!(figure(&page, "Ensemble capped") > -13.5 && figure(&page, "Clone (uniform) capped") < -90.0);
 }

@@ -3,11 +3,12 @@
 
 use std::cell::Cell;
 
-use ape_lab::ape::observer::ObserverChoice;
 use ape_lab::ape::{Config, Trainer};
-use ape_lab::experiment::{Preset, Setup};
+use ape_lab::attack::AttackerChoice;
+use ape_lab::experiment::{Preset, Setup, Sweep, Task};
 use ape_lab::lab::{
-    Command, Event, Link, PROTOCOL, Pace, RunState, Session, Snapshot, Started, ThreadLink, decode, encode,
+    Command, Event, Exported, Link, PROTOCOL, Pace, RunState, Session, Snapshot, Started, TaskEvent, ThreadLink,
+    decode, encode, thread_pool,
 };
 use ape_lab::mdp::{Grid, GridSpec};
 
@@ -19,6 +20,7 @@ struct Desk {
     snapshots: Vec<Snapshot>,
     started: Vec<Started>,
     refused: Vec<String>,
+    exported: Vec<Exported>,
     /// Whether snapshots are answered.
     is_drawing: bool,
 }
@@ -32,6 +34,7 @@ impl Desk {
             snapshots: Vec::new(),
             started: Vec::new(),
             refused: Vec::new(),
+            exported: Vec::new(),
             is_drawing: true,
         }
     }
@@ -49,6 +52,7 @@ impl Desk {
                 Event::Ready { .. } => unreachable!("drivers say so, not sessions"),
                 Event::Started(started) => self.started.push(*started),
                 Event::Refused(sentence) => self.refused.push(sentence),
+                Event::Exported(exported) => self.exported.push(*exported),
                 Event::Snapshot(snapshot) => {
                     if self.is_drawing {
                         self.session.handle(Command::Seen(snapshot.number));
@@ -109,11 +113,11 @@ fn a_run_plays_to_its_end_and_shows_what_the_trainer_makes() {
     assert_eq!((last.state, last.update, last.last_update), (RunState::Finished, 20, 20));
     assert_eq!(last.digest, digest_after(short(), 20));
     assert!(last.training_ms > 0.0);
-    assert_eq!((last.experts.len(), last.clones[0].observer), (2, ObserverChoice::UNIFORM));
+    assert_eq!((last.experts.len(), last.clones[0].cloner), (2, AttackerChoice::UNIFORM));
     let curve: Vec<u32> = desk.snapshots.iter().flat_map(|s| s.curve.iter().map(|point| point.update)).collect();
     assert_eq!(curve, (0..=20).collect::<Vec<_>>());
     assert_eq!(desk.started.len(), 1);
-    assert!((desk.started[0].optimal.returns.capped_return + 9.0).abs() < 1e-6);
+    assert!((desk.started[0].optimal.returns.capped_return.unwrap() + 9.0).abs() < 1e-6);
 }
 
 #[test]
@@ -281,13 +285,14 @@ fn what_cannot_be_done_is_refused_and_changes_nothing() {
 #[test]
 fn a_given_ensemble_is_shown_and_not_trained() {
     let mut desk = Desk::new();
-    desk.send(Command::Show(ObserverChoice::all().collect()));
+    desk.send(Command::Show(AttackerChoice::usual()));
     desk.send(Command::Load { setup: Box::new((Preset::find("trap").unwrap().setup)()), play: true });
     desk.run(1e3);
     assert_eq!(desk.last().state, RunState::Given);
-    let names: Vec<String> = desk.last().clones.iter().map(|clone| clone.observer.to_string()).collect();
-    assert_eq!(names, ["occupancy", "uniform", "replay(60)"]);
-    assert!((desk.last().clones[0].view.returns.capped_return + 90.45).abs() < 0.005);
+    let names: Vec<String> = desk.last().clones.iter().map(|clone| clone.cloner.to_string()).collect();
+    // All but those that take long.
+    assert_eq!(names, ["occupancy", "uniform", "replay(60)", "filtered", "history_k(1)", "history_k(2)", "history"]);
+    assert!((desk.last().clones[0].view.returns.capped_return.unwrap() + 90.45).abs() < 0.005);
     desk.send(Command::Play);
     assert_eq!(desk.refused, ["This ensemble was given: there is nothing to train."]);
 }
@@ -299,11 +304,55 @@ fn clones_that_are_asked_for_are_evaluated() {
     desk.load(Config { total_steps: 400_000, ..Config::default() }, true);
     desk.run(1e6);
     assert_eq!(desk.last().clones.len(), 1);
-    desk.send(Command::Show(vec![ObserverChoice::OCCUPANCY, ObserverChoice::PAPER]));
+    desk.send(Command::Show(vec![AttackerChoice::OCCUPANCY, "replay".parse().unwrap()]));
     desk.run(1e3);
     let returns: Vec<f64> = desk.last().clones.iter().map(|clone| clone.view.returns.horizon_return).collect();
     assert_eq!(returns.len(), 3);
     assert!((returns[1] - returns[2]).abs() < 3.0, "{returns:?}");
+}
+
+/// The ensemble in full precision, with what made it; also while training goes on, without disturbing it.
+#[test]
+fn the_ensemble_can_be_exported() {
+    let mut desk = Desk::new();
+    desk.send(Command::Export);
+    assert_eq!(desk.refused, ["Nothing has been loaded yet."]);
+    desk.load(short(), true);
+    desk.send(Command::Step);
+    desk.send(Command::Export);
+    let exported = desk.exported.pop().unwrap();
+    assert_eq!((exported.run, exported.update, exported.file.config.clone()), (1, 1, Some(short())));
+    let mut trainer = Trainer::new(Grid::new(GridSpec::default()).unwrap(), short()).unwrap();
+    trainer.update();
+    assert_eq!(exported.file.check().unwrap().1, trainer.ensemble());
+}
+
+/// A pool does every task once, whatever its size, and nothing of what is cancelled.
+#[test]
+fn a_pool_does_every_task_once() {
+    let setup = Setup { config: short(), ..Setup::default() };
+    let tasks: Vec<Task> =
+        Sweep::setups(&setup, &[0.0, 0.5], 3).into_iter().map(|setup| Task::Sweep { setup: Box::new(setup) }).collect();
+    let mut pool = thread_pool(|| ());
+    let ids: Vec<u32> = tasks.iter().map(|task| pool.begin(task.clone())).collect();
+    pool.cancel(ids[2]);
+    let mut outcomes = Vec::new();
+    while outcomes.len() < 5 {
+        for (id, event) in pool.receive() {
+            match event {
+                TaskEvent::Done(outcome) => outcomes.push((id, *outcome)),
+                TaskEvent::Failed(sentence) => panic!("{sentence}"),
+                _ => {}
+            }
+        }
+        std::thread::sleep(std::time::Duration::from_millis(1));
+    }
+    outcomes.sort_by_key(|(id, _)| *id);
+    let expected = ids.iter().zip(&tasks).filter(|(id, _)| **id != ids[2]);
+    let expected: Vec<_> =
+        expected.map(|(id, task)| (*id, task.run(&|| 0.0, &mut |_| true).unwrap().unwrap())).collect();
+    assert_eq!(outcomes, expected);
+    assert!(pool.receive().is_empty());
 }
 
 /// The thread behind the native window: ready, a whole run, and a new thread when asked for.

@@ -10,7 +10,7 @@ pub trait Hand {
     /// Begins a task; the last one has ended or was stopped.
     fn begin(&mut self, task: &Task);
 
-    /// What it has to say, in order; an error when it has died.
+    /// What it has to say of its task, in order; an error when it has died.
     fn receive(&mut self) -> Option<Result<TaskEvent, String>>;
 
     /// Gives up the task at hand.

@@ -73,7 +73,7 @@ pub struct Exported {
 /// From a worker that does a [`crate::experiment::Task`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum TaskEvent {
-    /// The worker listens.
+    /// The worker listens; not about a task.
     Ready,
     /// How much of it is done, 0..=1.
     Progress(f32),

@@ -102,11 +102,11 @@ fn start(wake: Arc<dyn Fn() + Send + Sync>) -> (Sender<Command>, Receiver<Event>
     (commands, events)
 }
 
-/// A pool of threads, one for each core but that of the window.
+/// A pool of threads, one for each core.
 pub fn thread_pool(wake: impl Fn() + Send + Sync + 'static) -> Pool {
     let wake: Arc<dyn Fn() + Send + Sync> = Arc::new(wake);
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
-    Pool::new(cores.saturating_sub(1), move || Box::new(ThreadHand { wake: wake.clone(), at_work: None }))
+    Pool::new(cores, move || Box::new(ThreadHand { wake: wake.clone(), at_work: None }))
 }
 
 struct ThreadHand {

@@ -6,7 +6,7 @@ use super::board::Shown;
 use super::experiments::bench::BenchTab;
 use super::experiments::sweep::SweepTab;
 use super::experiments::table1::Table1Tab;
-use super::heatmap::Pictures;
+use super::heatmap::{self, Pictures};
 use super::host::Host;
 use super::panels::Touched;
 use super::theme::{self, GAP, NARROW, Palette, SPACE, WIDE};
@@ -526,14 +526,20 @@ impl App {
             (Tab::Bench, "Attack bench", "Every cloner against the ensemble that is shown"),
             (Tab::Table1, "Table 1", "The paper's comparison, over seeds"),
         ];
-        choose(ui, "Tab", &mut self.view.tab, &options);
+        let is_stacked = ui.ctx().content_rect().width() < WIDE;
+        ui.horizontal(|ui| {
+            choose(ui, "Tab", &mut self.view.tab, &options);
+            if self.view.tab == Tab::Train && !is_stacked {
+                ui.add_space(SPACE);
+                heatmap::color_bar(ui);
+            }
+        });
         ui.add_space(2.0);
         if self.view.tab == Tab::Train {
             return self.show_board(ui, draw);
         }
         theme::card(ui).show(ui, |ui| {
             ui.set_width(ui.available_width());
-            let is_stacked = ui.ctx().content_rect().width() < WIDE;
             let mut show = |ui: &mut Ui| match self.view.tab {
                 Tab::Train => {}
                 Tab::Sweep => {

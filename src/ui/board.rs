@@ -58,7 +58,6 @@ impl Shown {
 
     /// Panels as large as the page allows, with chart and inspector beside or below them.
     pub fn show_planned(&self, ui: &mut Ui, view: &View, pictures: &mut Pictures) -> Touched {
-        heatmap::color_bar(ui);
         let panels = panels::list(&self.started, &self.snapshot, view);
         let area = ui.available_rect_before_wrap();
         let plan = Plan::new(ui, area.size(), panels.len(), &self.grid);

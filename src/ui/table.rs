@@ -54,7 +54,8 @@ pub fn table(ui: &mut Ui, id: &'static str, columns: &[Column], mut rows: Vec<Ve
         if is_falling { order.reverse() } else { order }
     });
     ScrollArea::horizontal().id_salt(id).show(ui, |ui| {
-        ui.spacing_mut().button_padding.x = 4.0;
+        ui.spacing_mut().button_padding.x = 0.0;
+        ui.spacing_mut().interact_size.y = 18.0;
         Grid::new(id).striped(true).spacing([14.0, 4.0]).min_col_width(0.0).show(ui, |ui| {
             for (index, column) in columns.iter().enumerate() {
                 let mark = match index == by {

@@ -136,11 +136,11 @@ impl Link for WorkerLink {
     }
 }
 
-/// A pool of workers, one for each core but that of the session.
+/// A pool of workers, one for each core: while they work the session mostly rests.
 pub fn worker_pool(wake: impl Fn() + 'static) -> Pool {
     let wake: Rc<dyn Fn()> = Rc::new(wake);
     let cores = web_sys::window().map_or(1.0, |window| window.navigator().hardware_concurrency());
-    Pool::new((cores as usize).saturating_sub(1), move || {
+    Pool::new(cores as usize, move || {
         Box::new(WorkerHand { wake: wake.clone(), line: None, is_ready: false, next: None })
     })
 }
@@ -166,10 +166,11 @@ impl Hand for WorkerHand {
 
     fn receive(&mut self) -> Option<Result<TaskEvent, String>> {
         let line = self.line.as_mut()?;
-        let event = line.receive()?;
-        if let (Ok(TaskEvent::Ready), Some(task)) = (&event, self.next.take()) {
+        let mut event = line.receive()?;
+        if event == Ok(TaskEvent::Ready) {
             self.is_ready = true;
-            line.send(&task);
+            self.next.take().iter().for_each(|task| line.send(task));
+            event = line.receive()?;
         }
         Some(event)
     }
