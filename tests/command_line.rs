@@ -85,6 +85,9 @@ fn flags_reach_the_configuration() {
         ["--discount", "0.9"],
         ["--return-to-go", "from_start"],
         ["--horizon", "90"],
+        ["--algorithm", "exact"],
+        ["--adversary-reward", "9,9=-1 stay=0.5"],
+        ["--alpha", "-14"],
     ] {
         assert_ne!(plain, digest(&different), "{different:?}");
     }
@@ -100,13 +103,23 @@ fn presets_are_listed() {
 #[test]
 fn bad_flags_get_one_sentence() {
     assert!(complaint(&["train", "--beta", "5"]).contains("--beta 5: must be a number from 0 to 2"));
-    assert!(complaint(&["train", "--observer", "me"]).contains("one of uniform, occupancy, replay(60)"));
+    assert!(complaint(&["train", "--observer", "me"]).contains("one of uniform, occupancy, replay(60), history"));
     assert!(complaint(&["train", "--preset", "none"]).contains("blind, paper, no-protection, trap"));
     assert!(complaint(&["train", "--preset", "trap"]).contains("nothing to train"));
     assert!(complaint(&["train", "--learning-rate"]).contains("--learning-rate"));
     assert!(complaint(&["train", "--no-such-flag"]).contains("--no-such-flag"));
     assert!(complaint(&["train", "--seed", "-1"]).contains("--seed -1"));
-    assert!(complaint(&[]).contains("evaluate, train, presets"));
+    assert!(complaint(&[]).contains("evaluate, train, attack, table1, sweep, results, presets"));
+    assert!(complaint(&["train", "--alpha", "5"]).contains("--alpha 5: must be none, or a return from -10000"));
+    assert!(complaint(&["train", "--adversary-reward", "9;9"]).contains("must be none, or rewards as 9,9=-1"));
+    let outside = complaint(&["train", "--adversary-reward", "10,0=1"]);
+    assert!(outside.contains("adversary_reward 10,0: must be a cell of the grid of 10 × 10"), "{outside}");
+    let memory = complaint(&["train", "--algorithm", "exact", "--observer", "history"]);
+    assert!(memory.contains("observer history: must be uniform or occupancy with the algorithm exact"), "{memory}");
+    assert!(complaint(&["table1", "--observer", "history"]).contains("needs one without a memory"));
+    assert!(complaint(&["table1", "--seeds", "0"]).contains("--seeds 0: must be a whole number from 1 to 1000"));
+    assert!(complaint(&["sweep", "--betas", "0:3:1"]).contains("--betas 0:3:1: must be FIRST:LAST:STEP"));
+    assert!(complaint(&["attack", "/no/such/file"]).contains("/no/such/file"));
     assert!(complaint(&["evaluate", "/no/such/file"]).contains("/no/such/file"));
 }
 
@@ -122,6 +135,9 @@ fn bad_files_get_one_sentence_and_leave_nothing_behind() {
         (json!({"experts": [[[0.2, 0.2, 0.2, 0.2, 0.2]]]}), "expert 1: the policy has 1 rows"),
         (json!({"experts": [vec![[0.5; 5]; 4]]}), "sum to 2.5"),
         (json!({"experts": [[[0.2]]]}), "not an ensemble file"),
+        (json!({"experts": [[[null, 0.2, 0.2, 0.2, 0.2]]]}), "not an ensemble file"),
+        (json!({"experts": [vec![[-0.2, 0.6, 0.2, 0.2, 0.2]; 4]]}), "probability -0.2 of action 0"),
+        (json!({"version": 99}), "version 99: this program reads version 1"),
         (json!({"grid": {"rows": 2, "cols": 2, "goal": [5, 0]}}), "lies outside"),
         (json!({"grid": {"rows": 99, "cols": 2, "goal": [0, 0]}}), "from 2 to 32"),
     ] {
@@ -129,9 +145,28 @@ fn bad_files_get_one_sentence_and_leave_nothing_behind() {
         bad.as_object_mut().unwrap().extend(change.as_object().unwrap().clone());
         let path = file("bad.json");
         std::fs::write(&path, bad.to_string()).unwrap();
-        let line = complaint(&["evaluate", path.to_str().unwrap()]);
+        for command in ["evaluate", "attack"] {
+            let line = complaint(&[command, path.to_str().unwrap()]);
+            assert!(line.contains("bad.json") && line.contains(expected), "{line}");
+        }
+    }
+    // Cut short, not a number, no text at all, a hundred megabytes.
+    let whole = good.to_string();
+    let path = file("bad.json");
+    for (bytes, expected) in [
+        (whole.as_bytes()[..whole.len() / 2].to_vec(), "not an ensemble file: EOF"),
+        (whole.replace("0.2", "NaN").into_bytes(), "not an ensemble file: expected value"),
+        (whole.replace("0.2", "1e999").into_bytes(), "not an ensemble file: number out of range"),
+        (vec![0xff, 0xfe, 0x00], "valid UTF-8"),
+        (Vec::new(), "not an ensemble file: EOF"),
+    ] {
+        std::fs::write(&path, bytes).unwrap();
+        let line = complaint(&["attack", path.to_str().unwrap()]);
         assert!(line.contains("bad.json") && line.contains(expected), "{line}");
     }
+    std::fs::File::create(&path).unwrap().set_len(100_000_000).unwrap();
+    let line = complaint(&["evaluate", path.to_str().unwrap()]);
+    assert!(line.contains("100000000 bytes: expected at most 10 MB"), "{line}");
     let nowhere = file("no-such-folder").join("out.json");
     let line = complaint(&["train", "--total-steps", "1", "--out", nowhere.to_str().unwrap()]);
     assert!(line.contains("no-such-folder"), "{line}");
@@ -140,4 +175,59 @@ fn bad_files_get_one_sentence_and_leave_nothing_behind() {
     std::fs::create_dir_all(folder.join("kept")).unwrap();
     complaint(&["train", "--total-steps", "1", "--out", folder.to_str().unwrap()]);
     assert!(!file("folder.json.part").exists());
+}
+
+/// Every cloner against a file, as a table, as JSON and as CSV.
+#[test]
+fn an_ensemble_file_is_attacked() {
+    let (out, csv) = (file("attacked.json"), file("attack.csv"));
+    let path = out.to_str().unwrap();
+    ape(&["train", "--total-steps", "800000", "--out", path]);
+    let attackers = "uniform,occupancy,bc_counts(20000),history_k(2),history,gru(1)";
+    let arguments = ["attack", path, "--attackers", attackers, "--seed", "4"];
+    let text = String::from_utf8(ape(&arguments).stdout).unwrap();
+    let json = ape(&[&arguments[..], &["--json", "--out", csv.to_str().unwrap()]].concat());
+    let bench: Value = serde_json::from_slice(&json.stdout).unwrap();
+    let evaluated: Value = serde_json::from_slice(&ape(&["evaluate", path]).stdout).unwrap();
+    assert_eq!((&bench["ensemble"], &bench["seed"]), (&evaluated["ensemble"], &json!(4)));
+    let lines = bench["attackers"].as_array().unwrap();
+    let names: Vec<&str> = lines.iter().filter_map(|line| line["attacker"].as_str()).collect();
+    assert_eq!(names.join(","), attackers);
+    assert!(names.iter().all(|name| text.contains(name)));
+    for (line, key) in [(&lines[0], "clone_uniform"), (&lines[1], "clone_occupancy")] {
+        for figure in ["capped_return", "uncapped_return", "horizon_return", "success"] {
+            assert_eq!(line["returns"][figure], evaluated[key][figure], "{key} {figure}");
+        }
+    }
+    assert_eq!((&lines[2]["pairs"], &lines[3]["drop"]), (&json!(20_000), &Value::Null));
+    assert!(lines[5]["returns"]["horizon_error"].as_f64() > Some(0.0));
+    assert_eq!(std::fs::read_to_string(csv).unwrap().lines().count(), 1 + names.len());
+    let line = complaint(&["attack", path, "--attackers", "uniform,thief"]);
+    assert!(line.contains("\"thief\": must be one of uniform; occupancy;") && line.contains("or all"), "{line}");
+}
+
+/// Table 1 and the sweep: runs in order, whatever the number of cores.
+#[test]
+fn experiments_do_not_depend_on_the_number_of_cores() {
+    let short = ["--total-steps", "40000", "--exact-updates", "20"];
+    let run = |arguments: &[&str], cores: &str| {
+        let output = Command::new(env!("CARGO_BIN_EXE_ape"))
+            .args([arguments, &short, &["--json"]].concat())
+            .env("RAYON_NUM_THREADS", cores)
+            .output()
+            .unwrap();
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        String::from_utf8(output.stdout).unwrap()
+    };
+    let csv = file("sweep.csv");
+    let sweep = ["sweep", "--betas", "0:0.4:0.2", "--seeds", "2", "--out", csv.to_str().unwrap()];
+    let table = ["table1", "--seeds", "3", "--attackers", "uniform,bc_counts(1000),bc(300)"];
+    for arguments in [&sweep[..], &table[..]] {
+        assert_eq!(run(arguments, "1"), run(arguments, "3"));
+    }
+    let lines: Vec<String> = std::fs::read_to_string(&csv).unwrap().lines().map(str::to_owned).collect();
+    let starts: Vec<&str> = lines[1..].iter().filter_map(|line| line.get(..5)).collect();
+    assert_eq!(starts, ["0,1,-", "0,2,-", "0.2,1", "0.2,2", "0.4,1", "0.4,2"]);
+    let made: Value = serde_json::from_str(&run(&table, "2")).unwrap();
+    assert_eq!(made["runs"].as_array().unwrap().len(), 3 * 6);
 }

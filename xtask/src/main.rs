@@ -1,4 +1,4 @@
-//! The commands of this repository: `cargo xtask serve`, `build`, `test`, `tools`.
+//! The commands of this repository: `cargo xtask serve`, `build`, `test`, `results`, `tools`.
 //!
 //! Everything a command needs and does not find, it installs first, saying what it does and how long
 //! that takes. `tools` says what is needed and gets it, `steps` runs one command after another and sums
@@ -21,6 +21,7 @@ usage: cargo xtask COMMAND
   serve [--port N]   install what is missing, build the page, serve it on 127.0.0.1
   build              the same page made small for publishing, in dist/
   test [STEP ...]    install what tests need, run everything (or the named steps), sum up
+  results            make docs/RESULTS.md and its pictures anew (under 2 minutes on two cores)
   tools              only install what the other commands need
 ";
 
@@ -34,6 +35,7 @@ fn main() -> ExitCode {
         Some("serve") => serve(&rest),
         Some("build") => build(),
         Some("test") => test(&rest),
+        Some("results") => results(),
         Some("tools") => tools::install(&tools::ALL),
         Some("help" | "--help" | "-h") => {
             print!("{USAGE}");
@@ -116,6 +118,12 @@ fn serve(arguments: &[&str]) -> Result<(), Failure> {
 fn build_page() -> Result<(), Failure> {
     steps::say("building the page (the first time about 2 minutes on two cores, then seconds)");
     run("trunk", &["build", TRUNK[0], TRUNK[1], "--release"])
+}
+
+fn results() -> Result<(), Failure> {
+    steps::say("making every table and picture of docs/RESULTS.md (under 2 minutes on two cores)");
+    let ape = ["run", "--release", "--no-default-features", "--features", "cli", "--bin", "ape"];
+    run("cargo", &[&ape[..], &["--", "results", "docs"]].concat())
 }
 
 /// The page for publishing: built, then each wasm file made smaller.

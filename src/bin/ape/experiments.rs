@@ -2,6 +2,7 @@
 //! does not change the outcome.
 
 use std::io::{IsTerminal, Write};
+use std::path::Path;
 use std::sync::Mutex;
 use std::time::Instant;
 
@@ -244,6 +245,15 @@ pub fn sweep(matches: &ArgMatches) -> Result<(), String> {
     Ok(())
 }
 
-pub fn results(_matches: &ArgMatches) -> Result<(), String> {
-    Err("not yet".to_owned())
+pub fn results(matches: &ArgMatches) -> Result<(), String> {
+    let folder = Path::new(matches.get_one::<String>("folder").expect("it has a default"));
+    let files = ape_lab::report::results(&|tasks| run_all(tasks))?;
+    let pictures = folder.join("results");
+    std::fs::create_dir_all(&pictures).map_err(|error| format!("{}: {error}", pictures.display()))?;
+    for (name, text) in &files {
+        let path = folder.join(name);
+        write(&path.to_string_lossy(), text)?;
+        println!("{}: {} bytes", path.display(), text.len());
+    }
+    Ok(())
 }
