@@ -104,7 +104,9 @@ fn presets_are_listed() {
 fn bad_flags_get_one_sentence() {
     assert!(complaint(&["train", "--beta", "5"]).contains("--beta 5: must be a number from 0 to 2"));
     assert!(complaint(&["train", "--observer", "me"]).contains("one of uniform, occupancy, replay(60), history"));
-    assert!(complaint(&["train", "--preset", "none"]).contains("blind, paper, no-protection, trap"));
+    assert!(
+        complaint(&["train", "--preset", "none"]).contains("blind, paper, exact, price, lure, no-protection, trap")
+    );
     assert!(complaint(&["train", "--preset", "trap"]).contains("nothing to train"));
     assert!(complaint(&["train", "--learning-rate"]).contains("--learning-rate"));
     assert!(complaint(&["train", "--no-such-flag"]).contains("--no-such-flag"));

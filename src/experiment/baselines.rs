@@ -23,7 +23,7 @@ pub struct Case<'a> {
     pub measure: Option<Measure>,
 }
 
-/// A row of the paper's Table 1: mean and standard deviation of ensemble and clone.
+/// A row of one of the paper's tables: mean and standard deviation of ensemble and clone.
 pub struct PaperRow {
     pub ensemble: (f64, f64),
     pub clone: (f64, f64),

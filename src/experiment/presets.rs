@@ -2,7 +2,7 @@
 
 use super::Setup;
 use crate::ape::observer::ObserverChoice;
-use crate::ape::{Config, Ensemble, EnsembleFile};
+use crate::ape::{AlgorithmKind, Config, Ensemble, EnsembleFile};
 use crate::mdp::{Action, Grid, GridSpec, Policy};
 
 /// A named starting point.
@@ -15,7 +15,7 @@ pub struct Preset {
 }
 
 /// Every preset; the first is where the page opens.
-pub static PRESETS: [Preset; 4] = [
+pub static PRESETS: [Preset; 7] = [
     Preset {
         name: "blind",
         title: "Blind clone",
@@ -27,6 +27,31 @@ pub static PRESETS: [Preset; 4] = [
         title: "Paper, literally",
         summary: "The paper's appendix word for word: replay(60) and one joint baseline. The clone ends as good as the ensemble.",
         setup: || Setup { config: Config::paper(), ..Setup::default() },
+    },
+    Preset {
+        name: "exact",
+        title: "Exact gradients",
+        summary: "The same objective climbed by its exact gradient, nothing sampled: a better ensemble and a clone as lost.",
+        setup: || Setup { config: Config { algorithm: AlgorithmKind::Exact, ..Config::default() }, ..Setup::default() },
+    },
+    Preset {
+        name: "price",
+        title: "At a given price",
+        summary: "The paper's Eq. 2: the worst clone that 14 steps an episode can buy. β follows by dual ascent.",
+        setup: || {
+            let config = Config { algorithm: AlgorithmKind::Exact, alpha: Some(-14.0), ..Config::default() };
+            Setup { config, ..Setup::default() }
+        },
+    },
+    Preset {
+        name: "lure",
+        title: "Another reward",
+        summary: "The semantics of reward: useless is not slow here but caught. The experts lure their clone into a corner.",
+        setup: || {
+            let adversary_reward = "0,9=-1".parse().ok();
+            let config = Config { algorithm: AlgorithmKind::Exact, beta: 1.0, adversary_reward, ..Config::default() };
+            Setup { config, ..Setup::default() }
+        },
     },
     Preset {
         name: "no-protection",

@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::baselines::PaperRow;
 use super::{Setup, Summary};
 use crate::ape::{Config, Trainer};
 use crate::attack::{AttackerChoice, Progress, Target};
@@ -67,11 +68,11 @@ pub struct SweepPoint {
 impl Sweep {
     /// The β of the paper's table (commented out in its source), with its ensemble and its clone, uncapped: mean and
     /// standard deviation over 3 seeds.
-    pub const PAPER: [(f64, (f64, f64), (f64, f64)); 4] = [
-        (0.0, (-9.0, 0.0), (-9.0, 0.0)),
-        (0.1, (-9.52, 0.22), (-41.22, 20.41)),
-        (0.2, (-10.06, 0.37), (-144.76, 55.68)),
-        (0.3, (-10.77, 0.68), (-280.0, 106.62)),
+    pub const PAPER: [(f64, PaperRow); 4] = [
+        (0.0, PaperRow { ensemble: (-9.0, 0.0), clone: (-9.0, 0.0) }),
+        (0.1, PaperRow { ensemble: (-9.52, 0.22), clone: (-41.22, 20.41) }),
+        (0.2, PaperRow { ensemble: (-10.06, 0.37), clone: (-144.76, 55.68) }),
+        (0.3, PaperRow { ensemble: (-10.77, 0.68), clone: (-280.0, 106.62) }),
     ];
 
     /// The setups of all β and seeds.

@@ -15,7 +15,7 @@ use super::{controls, focus, headline, help, toolbar};
 use crate::ape::observer::ObserverChoice;
 use crate::ape::{Config, EnsembleFile};
 use crate::attack::AttackerChoice;
-use crate::experiment::{Outcome, PRESETS, Setup, Task};
+use crate::experiment::{Denied, Outcome, PRESETS, Setup, Task};
 use crate::lab::{
     CloneView, Command, Event, Exported, Link, PROTOCOL, Pool, RunState, Snapshot, Started, TaskEvent, TaskId,
 };
@@ -162,6 +162,11 @@ impl App {
     /// The run on the page and its latest snapshot.
     pub fn shown(&self) -> Option<(&Started, &Snapshot)> {
         self.shown.as_ref().map(|shown| (&shown.started, &shown.snapshot))
+    }
+
+    /// What is collected of r̃, where the run denies the clone that.
+    pub fn denied(&self) -> Option<Denied> {
+        self.shown.as_ref()?.curve.last()?.denied
     }
 
     /// Whether a run has begun that has not shown anything yet.

@@ -4,7 +4,7 @@ use egui::{Ui, UiBuilder, vec2};
 
 use super::app::View;
 use super::heatmap::{self, Pictures};
-use super::panels::{self, Panel, Plan, Touched};
+use super::panels::{self, Ground, Panel, Plan, Touched};
 use super::theme::{self, GAP, NARROW};
 use super::{chart, inspector};
 use crate::experiment::CurvePoint;
@@ -85,7 +85,13 @@ impl Shown {
     }
 
     fn show_panels(&self, ui: &mut Ui, panels: &[Panel], plan: &Plan, view: &View, pictures: &mut Pictures) -> Touched {
-        panels::show(ui, panels, plan, &self.grid, view, self.version, pictures)
+        let reward = self.started.setup.config.adversary_reward.as_ref();
+        let rewards: Vec<(usize, f64)> = reward.map_or(Vec::new(), |reward| {
+            let of_cells = self.grid.starts().iter().map(|&s| (s as usize, reward.of_cell(self.grid.cell(s as usize))));
+            of_cells.filter(|(_, reward)| *reward != 0.0).collect()
+        });
+        let ground = Ground { grid: &self.grid, version: self.version, rewards: &rewards };
+        panels::show(ui, panels, plan, &ground, view, pictures)
     }
 
     fn show_chart(&self, ui: &mut Ui, view: &View) {

@@ -173,6 +173,14 @@ fn sentence(app: &App) -> String {
     // Below this share of arrivals steps are not the story.
     let is_lost = |returns: &KnownReturns| returns.success < 0.9;
     let (ensemble, clone) = (&KnownReturns::from(headline.ensemble), &headline.clone);
+    if let Some(denied) = app.denied() {
+        return format!(
+            "{experts} {reach} the goal in {} steps; of r̃ an expert collects {}, the clone that is to be denied it {}.",
+            steps(ensemble),
+            numbers::decimal(denied.ensemble, 1),
+            numbers::decimal(denied.clone, 1)
+        );
+    }
     let theirs = format!("{} clone ({})", if n == 1 { "its" } else { "their" }, headline.cloner);
     match (is_lost(ensemble), is_lost(clone)) {
         (false, true) => {

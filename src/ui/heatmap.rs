@@ -39,6 +39,8 @@ pub struct Heatmap<'a> {
     pub version: u64,
     /// The cell marked in every panel.
     pub marked: Option<usize>,
+    /// Cells with a reward of their own, r̃: it is written there.
+    pub rewards: &'a [(usize, f64)],
 }
 
 impl Heatmap<'_> {
@@ -56,6 +58,12 @@ impl Heatmap<'_> {
             mesh
         });
         ui.painter().add(Shape::Mesh(picture));
+        for &(state, reward) in self.rewards.iter().filter(|(state, _)| *state < self.grid.cells()) {
+            let place = self.cell_rect(rect, cell, state);
+            // What the experts lure the clone to is light, what they keep it from is dark.
+            let color = if reward < 0.0 { Color32::WHITE } else { Color32::BLACK };
+            ui.painter().rect_stroke(place.shrink(1.0), 0.0, Stroke::new(2.0, color), StrokeKind::Inside);
+        }
         if let Some(state) = self.marked.filter(|&state| state < self.grid.cells()) {
             let mark = self.cell_rect(rect, cell, state);
             ui.painter().rect_stroke(mark, 2.0, Stroke::new(4.0, Color32::BLACK), StrokeKind::Outside);

@@ -26,7 +26,7 @@ const PARAGRAPHS: [(&str, &str); 5] = [
         "What to try",
         "Move β to 0: the experts agree, and the clone is as good as they are. Move it up: they disagree where it hurts, \
          and the blind clone gets lost. Then choose the observer “occupancy”, who clones the demonstrations \
-         themselves: the protection is gone, whatever β is.",
+         themselves: the protection is gone, whatever β is. The tabs hold the paper's tables and every cloner.",
     ),
     (
         "Why that must be",

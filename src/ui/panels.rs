@@ -5,7 +5,7 @@ use egui::{Align, ComboBox, Layout, Rect, RichText, Ui, UiBuilder, Vec2, vec2};
 use super::app::View;
 use super::heatmap::{Heatmap, Pictures};
 use super::numbers;
-use super::theme::{self, GAP, Palette};
+use super::theme::{self, GAP, MENU, Palette};
 use super::widgets::{Icon, icon_button};
 use crate::attack::AttackerChoice;
 use crate::lab::{PolicyView, RunState, Snapshot, Started};
@@ -119,16 +119,25 @@ impl Plan {
     }
 }
 
+/// What all panels stand on.
+pub struct Ground<'a> {
+    pub grid: &'a Grid,
+    /// Changes whenever a policy does.
+    pub version: u64,
+    /// Cells with a reward r̃ of their own.
+    pub rewards: &'a [(usize, f64)],
+}
+
 /// Draws all panels by a plan, from the top left of what is free in `ui`.
 pub fn show(
     ui: &mut Ui,
     panels: &[Panel],
     plan: &Plan,
-    grid: &Grid,
+    ground: &Ground,
     view: &View,
-    version: u64,
     pictures: &mut Pictures,
 ) -> Touched {
+    let Ground { grid, version, rewards } = *ground;
     let mut touched = Touched::default();
     let title = title_height(ui);
     let size = vec2(plan.picture.x, plan.picture.y + title);
@@ -147,7 +156,8 @@ pub fn show(
             };
             let id = egui::Id::unique(("heatmap", &panel.title));
             let name = describe(&panel.title, policy);
-            let heatmap = Heatmap { id, name: &name, grid, policy, version, marked: view.cell };
+            let rewards = if panel.clone.is_some() { rewards } else { &[] };
+            let heatmap = Heatmap { id, name: &name, grid, policy, version, marked: view.cell, rewards };
             let cell = heatmap.show(ui, picture, pictures);
             touched.cell = touched.cell.or(cell);
         }
@@ -204,6 +214,7 @@ fn show_title(ui: &mut Ui, panel: &Panel, height: f32, view: &View, touched: &mu
         }
     });
     let kind = &RETURN_KINDS[view.kind];
+    let remembers = panel.clone.is_some_and(|(index, _)| view.clones[index].model().remembers);
     let text = match panel.policy.map(|policy| &policy.returns) {
         None => panel.waiting.clone(),
         Some(returns) => {
@@ -215,8 +226,14 @@ fn show_title(ui: &mut Ui, panel: &Panel, height: f32, view: &View, touched: &mu
             }
         }
     };
+    let text = if remembers { format!("at start: {text}") } else { text };
     ui.allocate_ui_with_layout(vec2(line.x, 20.0), Layout::left_to_right(Align::Center), |ui| {
-        ui.add(egui::Label::new(RichText::new(text).small().color(palette.muted)).truncate());
+        let label = ui.add(egui::Label::new(RichText::new(text).small().color(palette.muted)).truncate());
+        if remembers {
+            let help = "This clone remembers its episode. Arrows are what it does where an episode starts, colour the steps of an \
+                        episode that starts there.";
+            label.on_hover_text(help);
+        }
     });
 }
 
@@ -231,6 +248,7 @@ fn choose_cloner(ui: &mut Ui, index: usize, width: f32, view: &View, touched: &m
         choices.into_iter().filter(|choice| *choice == chosen || !view.clones.contains(choice)).collect();
     let response = ComboBox::from_id_salt(("clone", index))
         .width(width.max(60.0))
+        .height(MENU)
         .truncate()
         .selected_text(RichText::new(chosen.to_string()).color(Palette::of(ui).clone))
         .show_ui(ui, |ui| {

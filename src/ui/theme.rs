@@ -74,6 +74,9 @@ impl Palette {
 pub const GAP: f32 = 8.0;
 pub const SPACE: f32 = 16.0;
 
+/// Greatest height of a menu: all its lines, where the page is not tiny.
+pub const MENU: f32 = 480.0;
+
 /// Width of the page under which parts stack and touch targets grow.
 pub const NARROW: f32 = 720.0;
 /// Width from which the controls stand beside the panels.

@@ -48,6 +48,7 @@ fn presets(ui: &mut Ui, app: &mut App) {
     let title = chosen.map_or("own settings", |index| PRESETS[index].title);
     ComboBox::from_id_salt("preset")
         .width(150.0)
+        .height(theme::MENU)
         .selected_text(title)
         .show_ui(ui, |ui| {
             for (index, preset) in PRESETS.iter().enumerate() {

@@ -192,7 +192,7 @@ fn show_table(ui: &mut Ui, sweep: &Sweep, kind: usize) {
         ))
     };
     let rows = sweep.points(kind).into_iter().map(|point| {
-        let paper = Sweep::PAPER.iter().find(|(beta, ..)| *beta == point.beta);
+        let paper = Sweep::PAPER.iter().find(|(beta, _)| *beta == point.beta);
         let of_paper = |value: Option<(f64, f64)>| match value {
             Some((mean, sd)) => {
                 Cell::number(mean, format!("{} ± {sd:.2}", numbers::decimal(mean, 2))).colored(palette.muted)
@@ -204,8 +204,8 @@ fn show_table(ui: &mut Ui, sweep: &Sweep, kind: usize) {
             cell(&point.ensemble),
             cell(&point.clone),
             cell(&point.occupancy),
-            of_paper(paper.map(|(_, ensemble, _)| *ensemble)),
-            of_paper(paper.map(|(_, _, clone)| *clone)),
+            of_paper(paper.map(|(_, paper)| paper.ensemble)),
+            of_paper(paper.map(|(_, paper)| paper.clone)),
         ]
     });
     table(ui, "sweep table", &columns, rows.collect());
