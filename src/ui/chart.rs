@@ -50,6 +50,8 @@ pub fn plot(ui: &mut Ui, axes: Axes, curves: Vec<Curve>) {
         hints.tick_label_color(palette.muted).tick_label_font(TextStyle::Small.resolve(ui.style()))
     };
     let Axes { x, y, .. } = axes;
+    // A line for every so many points, so that each has room for its label.
+    let (across, up) = ((axes.size.x / 60.0).clamp(2.0, 8.0), (axes.size.y / 26.0).clamp(2.0, 8.0));
     let mut plot = Plot::new(axes.id)
         .width(axes.size.x)
         .height(axes.size.y)
@@ -59,8 +61,8 @@ pub fn plot(ui: &mut Ui, axes: Axes, curves: Vec<Curve>) {
         .allow_boxed_zoom(false)
         .show_background(false)
         .grid_color(palette.line)
-        .x_grid_spacer(uniform_grid_spacer(ticks))
-        .y_grid_spacer(uniform_grid_spacer(ticks))
+        .x_grid_spacer(uniform_grid_spacer(move |input| ticks(input, across)))
+        .y_grid_spacer(uniform_grid_spacer(move |input| ticks(input, up)))
         .custom_x_axes(vec![
             hints(AxisHints::new_x()).label_spacing(Rangef::new(20.0, 36.0)).formatter(move |mark, _| x(mark.value)),
         ])
@@ -176,9 +178,9 @@ pub fn in_steps(value: f64) -> String {
     numbers::decimal(value, usize::from(value.fract().abs() > 1e-9))
 }
 
-/// Distances of grid lines: 1, 2 or 5 times a power of ten, some eight of them over an axis.
-fn ticks(input: GridInput) -> [f64; 3] {
-    let least = (input.bounds.1 - input.bounds.0).max(f64::MIN_POSITIVE) / 8.0;
+/// Distances of grid lines: 1, 2 or 5 times a power of ten, at most about `lines` of them over an axis.
+fn ticks(input: GridInput, lines: f32) -> [f64; 3] {
+    let least = (input.bounds.1 - input.bounds.0).max(f64::MIN_POSITIVE) / f64::from(lines);
     let power = libm::pow(10.0, libm::floor(libm::log10(least)));
     let step = [1.0, 2.0, 5.0, 10.0].map(|times| times * power).into_iter().find(|&step| step >= least);
     let step = step.unwrap_or(10.0 * power);

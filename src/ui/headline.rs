@@ -197,7 +197,10 @@ fn sentence(app: &App) -> String {
 /// How far training is, in words.
 fn progress(app: &App) -> String {
     let Some((_, snapshot)) = app.shown() else { return "starting".to_owned() };
-    let of = format!("update {} of {}", snapshot.update, snapshot.last_update);
+    let mut of = format!("update {} of {}", snapshot.update, snapshot.last_update);
+    if app.setup().config.alpha.is_some() {
+        of += &format!(", β now {}", numbers::decimal(snapshot.beta, 2));
+    }
     match snapshot.state {
         _ if !app.is_session_alive() => format!("stopped at {of}"),
         _ if app.is_retraining() => "retraining …".to_owned(),

@@ -222,15 +222,15 @@ fn show_title(ui: &mut Ui, panel: &Panel, height: f32, view: &View, touched: &mu
             match returns.get(view.kind) {
                 _ if !kind.is_steps => arrive,
                 Some(value) => format!("{} steps, {arrive}", numbers::steps(value)),
-                None => format!("{} steps within T, {arrive}", numbers::steps(returns.horizon_return)),
+                None => format!("{} in T, {arrive}", numbers::steps(returns.horizon_return)),
             }
         }
     };
-    let text = if remembers { format!("at start: {text}") } else { text };
+    let text = if remembers { format!("start: {text}") } else { text };
     ui.allocate_ui_with_layout(vec2(line.x, 20.0), Layout::left_to_right(Align::Center), |ui| {
         let label = ui.add(egui::Label::new(RichText::new(text).small().color(palette.muted)).truncate());
         if remembers {
-            let help = "This clone remembers its episode. Arrows are what it does where an episode starts, colour the steps of an \
+            let help = "“in T” is the return within T steps. This clone remembers its episode. Arrows are what it does where an episode starts, colour the steps of an \
                         episode that starts there.";
             label.on_hover_text(help);
         }

@@ -94,9 +94,9 @@ fn show_table(ui: &mut Ui, made: &Table1, kind: usize) {
     let label = RETURN_KINDS[kind].label;
     let mut columns =
         vec![Column::new("method", "How the ensemble came about"), Column::new("ensemble", RETURN_KINDS[kind].help)];
-    columns.extend(made.attackers.iter().map(|cloner| Column::new(&cloner.to_string(), cloner.model().summary)));
     columns.push(Column::new("paper: ensemble", "The paper's Table 1"));
     columns.push(Column::new("paper: clone", "The paper's Table 1, by behaviour cloning"));
+    columns.extend(made.attackers.iter().map(|cloner| Column::new(&cloner.to_string(), cloner.model().summary)));
     let is_steps = RETURN_KINDS[kind].is_steps;
     let written = |summary: &Summary, is_steps: bool| {
         let number = |value: f64| if is_steps { numbers::short(value) } else { numbers::percent(value) };
@@ -112,6 +112,14 @@ fn show_table(ui: &mut Ui, made: &Table1, kind: usize) {
             Cell::number(row.method as f64, method.title.to_owned()).hover(method.summary),
             written(&row.ensemble, is_steps),
         ];
+        let paper = |value: Option<(f64, f64)>| match value {
+            Some((mean, sd)) => {
+                Cell::number(mean, format!("{} ± {sd:.2}", numbers::decimal(mean, 2))).colored(palette.muted)
+            }
+            None => Cell::number(f64::NEG_INFINITY, String::new()),
+        };
+        cells.push(paper(method.paper.as_ref().map(|paper| paper.ensemble)));
+        cells.push(paper(method.paper.as_ref().map(|paper| paper.clone)));
         for (clone, within) in row.clones.iter().zip(&within.clones) {
             cells.push(match (clone, within) {
                 (Some(clone), _) => {
@@ -126,14 +134,6 @@ fn show_table(ui: &mut Ui, made: &Table1, kind: usize) {
                 (None, None) => Cell::number(f64::NEG_INFINITY, "–".to_owned()),
             });
         }
-        let paper = |value: Option<(f64, f64)>| match value {
-            Some((mean, sd)) => {
-                Cell::number(mean, format!("{} ± {sd:.2}", numbers::decimal(mean, 2))).colored(palette.muted)
-            }
-            None => Cell::number(f64::NEG_INFINITY, String::new()),
-        };
-        cells.push(paper(method.paper.as_ref().map(|paper| paper.ensemble)));
-        cells.push(paper(method.paper.as_ref().map(|paper| paper.clone)));
         cells
     });
     ui.label(RichText::new(format!("Return ({label}), mean ± sd over seeds")).small().color(palette.muted));
