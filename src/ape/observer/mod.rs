@@ -32,7 +32,7 @@ pub trait Observer: Send {
     }
 }
 
-/// p(c|τ): who is taken to act, given the episode so far (paper, Eq. for sequential observers). What is
+/// p(c|τ): who is taken to act, given the episode so far (paper, Eq. 8). What is
 /// remembered between two steps is a row of numbers.
 pub trait Memory: Send + Sync {
     /// What is remembered before an episode's first cell.
