@@ -6,4 +6,5 @@ mod golden;
 #[test]
 fn a_seed_gives_the_same_bits_natively() {
     golden::check();
+    golden::check_clones();
 }

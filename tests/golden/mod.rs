@@ -1,8 +1,11 @@
-//! Digests of all parameters after 50 updates: the same natively, under node and in a browser.
+//! Digests of all parameters after 50 updates, and of learned clones: the same natively, under node and in a browser.
 //!
 //! They change only when training itself changes, which has to be said where it happens.
 
-use ape_lab::ape::{BaselineKind, Config, GradientKind, ReturnToGo, Trainer};
+use std::hash::Hasher;
+
+use ape_lab::ape::{AlgorithmKind, BaselineKind, Config, GradientKind, ReturnToGo, Trainer};
+use ape_lab::attack::{AttackerChoice, Target};
 use ape_lab::mdp::{Grid, GridSpec};
 
 /// Trains every configuration for 50 updates and compares.
@@ -20,16 +23,54 @@ pub fn check() {
         seed: 77,
         ..Config::default()
     };
+    let exact = Config {
+        experts: 3,
+        algorithm: AlgorithmKind::Exact,
+        observer: "occupancy".parse().unwrap(),
+        alpha: Some(-20.0),
+        exact_updates: 60,
+        ..Config::default()
+    };
+    let memory = Config {
+        observer: "history".parse().unwrap(),
+        adversary_reward: Some("0,3=-1 stay=0.5".parse().unwrap()),
+        ..Config::default()
+    };
     for (name, grid, config, expected) in [
         ("blind", GridSpec::default(), blind, 0xd7a37a4b3f88e32e),
         ("paper", GridSpec::default(), paper, 0x0790de7bb31be379),
-        ("other", slippery, other, 0x9a22f2c61dfd3395),
+        ("other", slippery.clone(), other, 0x9a22f2c61dfd3395),
+        ("exact", slippery.clone(), exact, 0xeda081376bf2c7c9),
+        ("memory", slippery.clone(), memory, 0xe10243a23b36f2ea),
     ] {
         let mut trainer = Trainer::new(Grid::new(grid).unwrap(), config).unwrap();
         for _ in 0..50 {
             trainer.update();
         }
         let digest: u64 = trainer.digest();
+        assert_eq!(digest, expected, "{name}: {digest:#018x}");
+    }
+}
+
+/// Attacks a short run on a slippery grid with everything that learns, counts or plays, and compares.
+pub fn check_clones() {
+    let spec = GridSpec { rows: 5, cols: 4, goal: (1, 1), walls: vec![(2, 2)], slip: 0.1 };
+    let grid = Grid::new(spec).unwrap();
+    let mut trainer = Trainer::new(grid.clone(), Config { experts: 3, ..Config::default() }).unwrap();
+    (0..60).for_each(|_| trainer.update());
+    let ensemble = trainer.ensemble();
+    for (name, expected) in
+        [("replay(9)", 0x719d7a74e64356a2), ("bc(2000)", 0xd23e8d7f28e12908), ("bc_counts(2000)", 0x2ee9b7d1724de020), ("filtered", 0x7f9b27b28974f7a6), ("history_k(2)", 0xdd674fc1b158ec11), ("gru(2)", 0x074430dfb8646009)]
+    {
+        let choice: AttackerChoice = name.parse().unwrap();
+        let target = Target { grid: &grid, ensemble: &ensemble, horizon: 30, seed: 5 };
+        let clone = choice.clone_of(&target, &mut |_| true).unwrap();
+        let returns = [clone.returns.horizon_return, clone.returns.success, clone.returns.horizon_error];
+        let mut digest = fnv::FnvHasher::default();
+        for number in clone.policy.rows().iter().flatten().chain(&clone.steps).chain(&returns) {
+            digest.write(&number.to_bits().to_le_bytes());
+        }
+        let digest = digest.finish();
         assert_eq!(digest, expected, "{name}: {digest:#018x}");
     }
 }
