@@ -2,7 +2,7 @@
 //! Exact APE: its gradient against finite differences, what it reaches, and the objectives beside the paper's first.
 
 use ape_lab::ape::observer::ObserverChoice;
-use ape_lab::ape::{AlgorithmKind, Config, Ensemble, ExactApe, Figures, Trainer, softmax};
+use ape_lab::ape::{Algorithm, AlgorithmKind, Config, Ensemble, ExactApe, Figures, Trainer, softmax};
 use ape_lab::experiment::{CurvePoint, Outcome, Setup, Task};
 use ape_lab::mdp::{ACTIONS, Grid, GridSpec, Policy, Solver, occupancy};
 
@@ -59,8 +59,8 @@ fn the_gradient_is_that_of_finite_differences() {
         };
         let mut ape = ExactApe::new(grid.clone(), config.clone());
         // Away from policies that are nearly uniform.
-        let logits: Vec<f64> = ape.logits().iter().map(|logit| 15.0 * logit).collect();
-        ape.set_logits(&logits);
+        let logits: Vec<f64> = ape.experts().logits.iter().map(|logit| 15.0 * logit).collect();
+        ape.experts_mut().logits = logits.clone();
         let gradient = ape.gradient();
         let at = |logits: &[f64]| objective(&grid, &config, &softmax(logits, grid.cells()));
         assert!((gradient.objective - at(&logits)).abs() < 1e-10);

@@ -45,8 +45,13 @@ fn check(config: Config) {
     for _ in 0..25 {
         trainer.update();
     }
-    let logits: Vec<f64> =
-        trainer.ensemble().policies().iter().flat_map(|p| p.rows().iter().flatten().map(|&p| libm::log(p))).collect();
+    let logits: Vec<f64> = trainer
+        .experts()
+        .ensemble()
+        .policies()
+        .iter()
+        .flat_map(|p| p.rows().iter().flatten().map(|&p| libm::log(p)))
+        .collect();
     let estimates: Vec<_> = (0..ESTIMATES).map(|_| trainer.estimate_gradient()).collect();
     let contexts = &estimates[0].contexts;
     let (mut largest, mut compared, mut worst) = (0.0f64, 0, 0.0f64);

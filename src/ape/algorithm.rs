@@ -2,25 +2,58 @@
 
 use std::hash::Hasher;
 
+use super::adam::Adam;
 use super::exact_ape::ExactApe;
 use super::pg_ape::PgApe;
 use super::{AlgorithmKind, Config, ConfigError, Contexts, Ensemble};
 use crate::mdp::{ACTIONS, Grid, Policy};
 
+/// What every algorithm holds: the experts, where and how they train.
+pub struct Experts {
+    pub grid: Grid,
+    pub config: Config,
+    /// θ, `[n][S][5]`.
+    pub logits: Vec<f64>,
+    adam: Adam,
+    /// Updates made so far.
+    pub updates: u32,
+}
+
+impl Experts {
+    /// `logits`: `[n][S][5]`.
+    pub fn new(grid: Grid, config: Config, logits: Vec<f64>) -> Experts {
+        Experts { adam: Adam::new(logits.len()), grid, config, logits, updates: 0 }
+    }
+
+    /// The experts as they are now.
+    pub fn ensemble(&self) -> Ensemble {
+        softmax(&self.logits, self.grid.cells())
+    }
+
+    /// θ ← θ + α_θ ∇J(θ), with the bonus on the entropy of the policies where they went: `visited` is the share of
+    /// visits to the pair (context, state) of this number, `weight` that of the bonus.
+    pub fn ascend(&mut self, mut gradient: Vec<f64>, weight: f64, visited: impl Fn(usize) -> f64) {
+        add_entropy_bonus(&self.ensemble(), weight, visited, &mut gradient);
+        self.adam.ascend(&mut self.logits, &gradient, self.config.learning_rate);
+        self.updates += 1;
+    }
+}
+
 /// A training algorithm at work.
 pub trait Algorithm: Send {
-    fn grid(&self) -> &Grid;
-    fn config(&self) -> &Config;
-    /// β for the updates to come; must lie in its range.
-    fn set_beta(&mut self, beta: f64);
-    fn updates(&self) -> u32;
-    /// The experts as they are now.
-    fn ensemble(&self) -> Ensemble;
-    /// p(c|s) of the run's observer as it stands.
+    fn experts(&self) -> &Experts;
+
+    fn experts_mut(&mut self) -> &mut Experts;
+
+    /// p(c|s) of the run's observer as it stands; of one with a memory, at the start of an episode.
     fn contexts(&mut self) -> Contexts;
-    /// All that is learned.
-    fn parameters(&self) -> [&[f64]; 2];
-    /// One update; returns the ensemble's return within T steps before it, mean over starts, as it was seen.
+
+    /// What is learned besides the logits.
+    fn values(&self) -> &[f64] {
+        &[]
+    }
+
+    /// One update; returns the ensemble's return within T before it, mean over starts, as it was seen.
     fn update(&mut self) -> f64;
 }
 
@@ -42,28 +75,28 @@ impl Trainer {
     }
 
     pub fn grid(&self) -> &Grid {
-        self.algorithm.grid()
+        &self.algorithm.experts().grid
     }
 
     pub fn config(&self) -> &Config {
-        self.algorithm.config()
+        &self.algorithm.experts().config
     }
 
     /// Updates made so far.
     pub fn updates(&self) -> u32 {
-        self.algorithm.updates()
+        self.algorithm.experts().updates
     }
 
     /// β for the updates to come.
     pub fn set_beta(&mut self, beta: f64) -> Result<(), ConfigError> {
         Config { beta, ..self.config().clone() }.check()?;
-        self.algorithm.set_beta(beta);
+        self.algorithm.experts_mut().config.beta = beta;
         Ok(())
     }
 
     /// The experts as they are now.
     pub fn ensemble(&self) -> Ensemble {
-        self.algorithm.ensemble()
+        self.algorithm.experts().ensemble()
     }
 
     /// p(c|s) of the run's observer as it stands; of one with a memory, at the start of an episode.
@@ -74,7 +107,7 @@ impl Trainer {
     /// A number that two runs share only when all their parameters agree to the last bit.
     pub fn digest(&self) -> u64 {
         let mut hash = fnv::FnvHasher::default();
-        for parameter in self.algorithm.parameters().concat() {
+        for parameter in self.algorithm.experts().logits.iter().chain(self.algorithm.values()) {
             hash.write(&parameter.to_bits().to_le_bytes());
         }
         hash.finish()
@@ -92,7 +125,7 @@ impl Trainer {
             let grid = self.grid();
             let found = ensemble_return * grid.starts().len() as f64 / grid.free_cells() as f64;
             let beta = dual_ascent(self.config().beta, found, alpha);
-            self.algorithm.set_beta(beta);
+            self.algorithm.experts_mut().config.beta = beta;
         }
     }
 }
@@ -121,7 +154,7 @@ pub fn softmax(logits: &[f64], cells: usize) -> Ensemble {
 
 /// Adds `weight` times the gradient of the mean entropy of the policies where they went: `visited` is the share
 /// of visits to the pair (context, state) of this number.
-pub fn add_entropy_bonus(ensemble: &Ensemble, weight: f64, visited: impl Fn(usize) -> f64, gradient: &mut [f64]) {
+fn add_entropy_bonus(ensemble: &Ensemble, weight: f64, visited: impl Fn(usize) -> f64, gradient: &mut [f64]) {
     if weight == 0.0 {
         return;
     }

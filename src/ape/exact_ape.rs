@@ -11,20 +11,14 @@
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-use super::adam::Adam;
-use super::algorithm::{Algorithm, add_entropy_bonus, softmax};
+use super::algorithm::{Algorithm, Experts};
 use super::observer::ObserverChoice;
-use super::{Config, Contexts, Ensemble};
+use super::{Config, Contexts};
 use crate::mdp::{ACTIONS, Grid, Policy};
 
 /// A training run by exact gradients.
 pub struct ExactApe {
-    grid: Grid,
-    config: Config,
-    /// θ, `[n][S][5]`.
-    logits: Vec<f64>,
-    adam: Adam,
-    updates: u32,
+    experts: Experts,
     dynamics: Dynamics,
     /// r̃(s, a), `[S][5]`; −1 everywhere where the clone's reward is the experts'.
     clone_reward: Vec<[f64; ACTIONS]>,
@@ -47,14 +41,14 @@ impl ExactApe {
             None => vec![[-1.0; ACTIONS]; grid.cells()],
         };
         let dynamics = Dynamics::new(&grid, config.horizon);
-        ExactApe { logits, adam: Adam::new(entries), updates: 0, dynamics, clone_reward, grid, config }
+        ExactApe { dynamics, clone_reward, experts: Experts::new(grid, config, logits) }
     }
 
     /// J of the experts as they are, its gradient by the logits `[n][S][5]`, the ensemble's part of J, and how
     /// often each cell is visited by each expert and by the clone: `[n + 1][S]`.
     pub fn gradient(&mut self) -> ExactGradient {
-        let ensemble = self.ensemble();
-        let (n, cells) = (ensemble.experts(), self.grid.cells());
+        let ensemble = self.experts.ensemble();
+        let (n, cells) = (ensemble.experts(), self.experts.grid.cells());
         let beta = self.beta_now();
         let share = 1.0 / n as f64;
         let mut by_policy = vec![[0.0; ACTIONS]; n * cells];
@@ -62,10 +56,10 @@ impl ExactApe {
         let own_reward = vec![[-1.0; ACTIONS]; cells];
         let mut own = 0.0;
         for (policy, by_policy) in ensemble.policies().iter().zip(by_policy.chunks_mut(cells)) {
-            own += share * self.dynamics.differentiate(&self.grid, policy, &own_reward, share, by_policy);
+            own += share * self.dynamics.differentiate(&self.experts.grid, policy, &own_reward, share, by_policy);
             visits.extend_from_slice(&self.dynamics.visits);
         }
-        let is_occupancy = self.config.observer == ObserverChoice::OCCUPANCY;
+        let is_occupancy = self.experts.config.observer == ObserverChoice::OCCUPANCY;
         let contexts = if is_occupancy {
             Contexts::from_weights(cells, n, |state, c| visits[c * cells + state])
         } else {
@@ -73,7 +67,7 @@ impl ExactApe {
         };
         let clone = ensemble.cloned(&contexts);
         let mut by_clone = vec![[0.0; ACTIONS]; cells];
-        let denied = self.dynamics.differentiate(&self.grid, &clone, &self.clone_reward, -beta, &mut by_clone);
+        let denied = self.dynamics.differentiate(&self.experts.grid, &clone, &self.clone_reward, -beta, &mut by_clone);
         visits.extend_from_slice(&self.dynamics.visits);
         for (pair, by_policy) in by_policy.iter_mut().enumerate() {
             let p = contexts.row(pair % cells)[pair / cells];
@@ -90,10 +84,16 @@ impl ExactApe {
                     if all > 0.0 { (0..ACTIONS).map(change).sum::<f64>() / all } else { 0.0 }
                 };
                 let worth: Vec<_> = (0..cells).map(|state| [worth(state); ACTIONS]).collect();
-                self.dynamics.differentiate(&self.grid, policy, &worth, 1.0, &mut by_policy[c * cells..][..cells]);
+                self.dynamics.differentiate(
+                    &self.experts.grid,
+                    policy,
+                    &worth,
+                    1.0,
+                    &mut by_policy[c * cells..][..cells],
+                );
             }
         }
-        let mut logits = vec![0.0; self.logits.len()];
+        let mut logits = vec![0.0; self.experts.logits.len()];
         for (pair, logits) in logits.as_chunks_mut::<ACTIONS>().0.iter_mut().enumerate() {
             let pi = ensemble.policies()[pair / cells].row(pair % cells);
             let mean: f64 = pi.iter().zip(&by_policy[pair]).map(|(p, g)| p * g).sum();
@@ -108,21 +108,12 @@ impl ExactApe {
     /// leave, while experts that were parted under a large β stay parted under a small one, at a better J. So a
     /// run starts with β at least [`Self::PARTING_BETA`] and comes down to its own over its first half.
     fn beta_now(&self) -> f64 {
-        let Config { beta, alpha, exact_updates, .. } = self.config;
+        let Config { beta, alpha, exact_updates, .. } = self.experts.config;
         if beta == 0.0 || alpha.is_some() {
             return beta;
         }
-        let done = f64::from(self.updates) / f64::from(exact_updates);
+        let done = f64::from(self.experts.updates) / f64::from(exact_updates);
         beta + (Self::PARTING_BETA - beta).max(0.0) * (1.0 - 2.0 * done).max(0.0)
-    }
-
-    /// Puts logits in the place of the experts', `[n][S][5]`.
-    pub fn set_logits(&mut self, logits: &[f64]) {
-        self.logits.copy_from_slice(logits);
-    }
-
-    pub fn logits(&self) -> &[f64] {
-        &self.logits
     }
 }
 
@@ -139,44 +130,31 @@ pub struct ExactGradient {
 }
 
 impl Algorithm for ExactApe {
-    fn grid(&self) -> &Grid {
-        &self.grid
+    fn experts(&self) -> &Experts {
+        &self.experts
     }
 
-    fn config(&self) -> &Config {
-        &self.config
-    }
-
-    fn set_beta(&mut self, beta: f64) {
-        self.config.beta = beta;
-    }
-
-    fn updates(&self) -> u32 {
-        self.updates
-    }
-
-    fn ensemble(&self) -> Ensemble {
-        softmax(&self.logits, self.grid.cells())
+    fn experts_mut(&mut self) -> &mut Experts {
+        &mut self.experts
     }
 
     fn contexts(&mut self) -> Contexts {
-        self.config.observer.contexts(&self.grid, &self.ensemble(), self.config.horizon, 0)
-    }
-
-    fn parameters(&self) -> [&[f64]; 2] {
-        [&self.logits, &[]]
+        self.experts.config.observer.contexts(
+            &self.experts.grid,
+            &self.experts.ensemble(),
+            self.experts.config.horizon,
+            0,
+        )
     }
 
     fn update(&mut self) -> f64 {
-        let ExactGradient { mut logits, ensemble_return, visits, .. } = self.gradient();
-        let (experts, clone) = visits.split_at(self.config.experts as usize * self.grid.cells());
+        let ExactGradient { logits, ensemble_return, visits, .. } = self.gradient();
+        let (experts, clone) = visits.split_at(self.experts.config.experts as usize * self.experts.grid.cells());
         let (all, by_clone) = (experts.iter().sum::<f64>(), clone.iter().sum::<f64>());
-        let n = f64::from(self.config.experts);
+        let n = f64::from(self.experts.config.experts);
         let visited = |pair: usize| experts[pair] / all + clone[pair % clone.len()] / by_clone / n;
-        let weight = Self::EXPLORATION * self.config.entropy_weight(self.updates);
-        add_entropy_bonus(&self.ensemble(), weight, visited, &mut logits);
-        self.adam.ascend(&mut self.logits, &logits, self.config.learning_rate);
-        self.updates += 1;
+        let weight = Self::EXPLORATION * self.experts.config.entropy_weight(self.experts.updates);
+        self.experts.ascend(logits, weight, visited);
         ensemble_return
     }
 }

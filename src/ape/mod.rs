@@ -16,7 +16,7 @@ mod pg_ape;
 mod reward;
 
 pub use adam::Adam;
-pub use algorithm::{Algorithm, Trainer, softmax};
+pub use algorithm::{Algorithm, Experts, Trainer, softmax};
 pub use choice::{Choice, ChoiceError, Model, Parameter};
 pub use config::{AlgorithmKind, BaselineKind, Config, GradientKind, ReturnToGo};
 pub use demonstrate::{Demonstrator, Episode};

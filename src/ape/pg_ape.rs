@@ -12,7 +12,7 @@ use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::adam::Adam;
-use super::algorithm::{Algorithm, add_entropy_bonus, softmax};
+use super::algorithm::{Algorithm, Experts};
 use super::demonstrate::{ContextDraw, Demonstrator, Episode, action_draws};
 use super::observer::Observer;
 use super::{BaselineKind, Config, Contexts, Ensemble, GradientKind, ReturnToGo};
@@ -68,17 +68,12 @@ pub struct Gradient {
 
 /// A training run: the experts, their baselines, and all that an update needs.
 pub struct PgApe {
-    grid: Grid,
-    config: Config,
+    experts: Experts,
     rng: Xoshiro256PlusPlus,
     observer: Box<dyn Observer>,
-    /// θ, `[n][S][5]`.
-    logits: Vec<f64>,
     /// φ. `joint`: Ṽ_c, `[n][S]`. `separate`: V_c, `[n][S]`, then V_o, `[S]`.
     values: Vec<f64>,
-    logits_adam: Adam,
     values_adam: Adam,
-    updates: u32,
     /// Return that follows a step when k steps are left, counted from that step: `[T + 1]`.
     to_go: Vec<f64>,
     /// What the return after step t counts: γᵗ for `from_start`, 1 for `from_step`: `[T]`.
@@ -112,28 +107,24 @@ impl PgApe {
         PgApe {
             rng: Xoshiro256PlusPlus::seed_from_u64(u64::from(config.seed)),
             observer: config.observer.build(&grid, experts),
-            logits: vec![0.0; pairs * ACTIONS],
             values: vec![0.0; values],
-            logits_adam: Adam::new(pairs * ACTIONS),
             values_adam: Adam::new(values),
-            updates: 0,
             to_go,
             weights,
             ensemble_tally: Tally::new(pairs * ACTIONS),
             clone_tally: Tally::new(pairs * ACTIONS),
             episode: Episode::default(),
             adversary_reward: config.adversary_reward.as_ref().map(|reward| reward.table(&grid)),
-            grid,
-            config,
+            experts: Experts::new(grid, config, vec![0.0; pairs * ACTIONS]),
         }
     }
 
     /// The gradient that the next update would take, without entropy bonus and without taking it. Every
     /// call plays new episodes, so that calls give independent estimates.
     pub fn estimate_gradient(&mut self) -> Gradient {
-        let ensemble = self.ensemble();
+        let ensemble = self.experts.ensemble();
         self.play_ensemble(&ensemble);
-        let contexts = self.observer.contexts(&self.grid, &ensemble, self.config.horizon);
+        let contexts = self.observer.contexts(&self.experts.grid, &ensemble, self.experts.config.horizon);
         self.play_clone(&ensemble, &contexts);
         Gradient { logits: self.policy_gradient(&ensemble, &contexts), contexts }
     }
@@ -141,8 +132,8 @@ impl PgApe {
     /// Plays τ₁: an expert is drawn for an episode and acts for all of it.
     fn play_ensemble(&mut self, ensemble: &Ensemble) {
         self.ensemble_tally.clear();
-        let demonstrator = Demonstrator::new(&self.grid, ensemble, self.config.horizon);
-        while self.ensemble_tally.steps < self.config.batch_steps {
+        let demonstrator = Demonstrator::new(&self.experts.grid, ensemble, self.experts.config.horizon);
+        while self.ensemble_tally.steps < self.experts.config.batch_steps {
             let context = demonstrator.play(&mut self.episode, &mut self.rng);
             let steps = self.episode.entries.len();
             self.ensemble_tally.add_episode(&self.episode.entries, |t| self.to_go[steps - t], &self.weights);
@@ -153,20 +144,21 @@ impl PgApe {
     /// Plays τ₂: the context is drawn anew at each state, then the action from that expert.
     fn play_clone(&mut self, ensemble: &Ensemble, contexts: &Contexts) {
         let draws = action_draws(ensemble);
-        let cells = self.grid.cells();
+        let cells = self.experts.grid.cells();
         let context_draws: Vec<ContextDraw> = (0..cells).map(|state| ContextDraw::new(contexts.row(state))).collect();
         let memory = self.observer.memory(ensemble);
         let mut remembered = Vec::new();
         let mut p = vec![0.0; ensemble.experts()];
         self.clone_tally.clear();
-        let starts = Starts::new(&self.grid);
-        while self.clone_tally.steps < self.config.batch_steps {
+        let starts = Starts::new(&self.experts.grid);
+        while self.clone_tally.steps < self.experts.config.batch_steps {
             let mut state = starts.start(&mut self.rng);
             self.episode.entries.clear();
             if let Some(memory) = &memory {
                 remembered = memory.start();
             }
-            while state != self.grid.goal() && self.episode.entries.len() < self.config.horizon as usize {
+            while state != self.experts.grid.goal() && self.episode.entries.len() < self.experts.config.horizon as usize
+            {
                 // One draw of 64 bits: half for the context, half for the action.
                 let bits = self.rng.next_u64();
                 let context = match &memory {
@@ -191,7 +183,7 @@ impl PgApe {
                     let mut to_go = vec![0.0; entries.len() + 1];
                     for (t, &entry) in entries.iter().enumerate().rev() {
                         let (pair, action) = (entry as usize / ACTIONS, entry as usize % ACTIONS);
-                        to_go[t] = reward[pair % cells][action] + self.config.discount * to_go[t + 1];
+                        to_go[t] = reward[pair % cells][action] + self.experts.config.discount * to_go[t + 1];
                     }
                     self.clone_tally.add_episode(entries, |t| to_go[t], &self.weights);
                 }
@@ -201,8 +193,8 @@ impl PgApe {
 
     /// G₁ + G₂ (paper, Eqs. 5–7).
     fn policy_gradient(&self, ensemble: &Ensemble, contexts: &Contexts) -> Vec<f64> {
-        let (beta, cells) = (self.config.beta, self.grid.cells());
-        let pairs = self.config.experts as usize * cells;
+        let (beta, cells) = (self.experts.config.beta, self.experts.grid.cells());
+        let pairs = self.experts.config.experts as usize * cells;
         let mut gradient = vec![0.0; pairs * ACTIONS];
         let mut add = |pair: usize, score: [f64; ACTIONS]| {
             // Σ_a score(a) ∇ log π_c(a|s), for a softmax: score(b) − π(b) Σ_a score(a).
@@ -226,10 +218,10 @@ impl PgApe {
         }
         // G₂ = 1/N₂ Σ ∇ log π_o(a|s) Ã(t), Ã(t) = −βR(t) − Ṽ_o(s).
         let per_episode = 1.0 / f64::from(self.clone_tally.episodes);
-        match self.config.gradient {
+        match self.experts.config.gradient {
             GradientKind::SampledContext => {
                 for pair in 0..pairs {
-                    let baseline = match self.config.baseline {
+                    let baseline = match self.experts.config.baseline {
                         BaselineKind::Joint => self.values[pair],
                         BaselineKind::Separate => -beta * self.values[pairs + pair % cells],
                     };
@@ -240,7 +232,7 @@ impl PgApe {
                 for state in 0..cells {
                     let p = contexts.row(state);
                     // The score does not depend on the context drawn, so neither may the baseline.
-                    let baseline = match self.config.baseline {
+                    let baseline = match self.experts.config.baseline {
                         BaselineKind::Joint => {
                             p.iter().enumerate().map(|(c, p)| p * self.values[c * cells + state]).sum()
                         }
@@ -275,8 +267,8 @@ impl PgApe {
 
     /// −∇J(φ) (paper, Eq. 4): the way down the squared error of the baselines, per episode.
     fn value_gradient(&self) -> Vec<f64> {
-        let Config { beta, value_weight, baseline, .. } = self.config;
-        let pairs = self.config.experts as usize * self.grid.cells();
+        let Config { beta, value_weight, baseline, .. } = self.experts.config;
+        let pairs = self.experts.config.experts as usize * self.experts.grid.cells();
         let mut gradient = vec![0.0; self.values.len()];
         for pair in 0..pairs {
             let mut fit = |tally: &Tally, index: usize, scale: f64| {
@@ -288,7 +280,7 @@ impl PgApe {
             match baseline {
                 BaselineKind::Joint => fit(&self.clone_tally, pair, -beta),
                 // Fitted to R itself, so that β can change while it trains.
-                BaselineKind::Separate => fit(&self.clone_tally, pairs + pair % self.grid.cells(), 1.0),
+                BaselineKind::Separate => fit(&self.clone_tally, pairs + pair % self.experts.grid.cells(), 1.0),
             }
         }
         gradient
@@ -296,53 +288,39 @@ impl PgApe {
 }
 
 impl Algorithm for PgApe {
-    fn grid(&self) -> &Grid {
-        &self.grid
+    fn experts(&self) -> &Experts {
+        &self.experts
     }
 
-    fn config(&self) -> &Config {
-        &self.config
-    }
-
-    fn set_beta(&mut self, beta: f64) {
-        self.config.beta = beta;
-    }
-
-    fn updates(&self) -> u32 {
-        self.updates
-    }
-
-    fn ensemble(&self) -> Ensemble {
-        softmax(&self.logits, self.grid.cells())
+    fn experts_mut(&mut self) -> &mut Experts {
+        &mut self.experts
     }
 
     fn contexts(&mut self) -> Contexts {
-        let ensemble = self.ensemble();
-        self.observer.contexts(&self.grid, &ensemble, self.config.horizon)
+        let ensemble = self.experts.ensemble();
+        self.observer.contexts(&self.experts.grid, &ensemble, self.experts.config.horizon)
     }
 
-    fn parameters(&self) -> [&[f64]; 2] {
-        [&self.logits, &self.values]
+    fn values(&self) -> &[f64] {
+        &self.values
     }
 
     /// One iteration of Algorithm 1.
     fn update(&mut self) -> f64 {
-        let ensemble = self.ensemble();
+        let ensemble = self.experts.ensemble();
         // 2: generate trajectories τ₁ with π_c.
         self.play_ensemble(&ensemble);
         // 3: generate trajectories τ₂ with π_o.
-        let contexts = self.observer.contexts(&self.grid, &ensemble, self.config.horizon);
+        let contexts = self.observer.contexts(&self.experts.grid, &ensemble, self.experts.config.horizon);
         self.play_clone(&ensemble, &contexts);
         // 4: gradient update on the experts, θ ← θ + α_θ ∇J(θ).
-        let mut gradient = self.policy_gradient(&ensemble, &contexts);
+        let gradient = self.policy_gradient(&ensemble, &contexts);
+        let value_gradient = self.value_gradient();
         let share = |tally: &Tally, pair| tally.pair(pair).0 / f64::from(tally.steps);
         let visited = |pair| share(&self.ensemble_tally, pair) + share(&self.clone_tally, pair);
-        add_entropy_bonus(&ensemble, self.config.entropy_weight(self.updates), visited, &mut gradient);
-        let value_gradient = self.value_gradient();
-        self.logits_adam.ascend(&mut self.logits, &gradient, self.config.learning_rate);
+        self.experts.ascend(gradient, self.experts.config.entropy_weight(self.experts.updates), visited);
         // 5: update of the value function, φ ← φ − α_φ ∇J(φ).
-        self.values_adam.ascend(&mut self.values, &value_gradient, self.config.learning_rate);
-        self.updates += 1;
+        self.values_adam.ascend(&mut self.values, &value_gradient, self.experts.config.learning_rate);
         -f64::from(self.ensemble_tally.steps) / f64::from(self.ensemble_tally.episodes)
     }
 }

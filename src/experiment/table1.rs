@@ -13,8 +13,8 @@ use crate::mdp::{Grid, KnownReturns, RETURN_KINDS, Returns};
 /// One seed of one method.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MethodRun {
-    /// Place in [`METHODS`].
-    pub method: u32,
+    /// Its name in [`METHODS`].
+    pub method: String,
     pub seed: u32,
     pub ensemble: Returns,
     /// In the order of the attackers asked for.
@@ -55,7 +55,7 @@ pub fn run_seed(
             clones.push(clone.returns);
             done += 1.0;
         }
-        runs.push(MethodRun { method: index as u32, seed: config.seed, ensemble: returns, clones });
+        runs.push(MethodRun { method: method.name.to_owned(), seed: config.seed, ensemble: returns, clones });
     }
     Ok(Some(runs))
 }
@@ -92,7 +92,7 @@ impl Table1 {
     /// The rows for one kind of return (its place in [`RETURN_KINDS`]).
     pub fn rows(&self, kind: usize) -> Vec<Row> {
         let row = |method: usize| {
-            let runs: Vec<&MethodRun> = self.runs.iter().filter(|run| run.method as usize == method).collect();
+            let runs: Vec<&MethodRun> = self.runs.iter().filter(|run| run.method == METHODS[method].name).collect();
             let ensemble: Vec<f64> = runs.iter().map(|run| (RETURN_KINDS[kind].get)(&run.ensemble)).collect();
             let clones = (0..self.attackers.len()).map(|column| {
                 let values: Option<Vec<f64>> = runs.iter().map(|run| run.clones[column].get(kind)).collect();
@@ -116,7 +116,7 @@ impl Table1 {
                 let values: Vec<String> = values.collect();
                 text += &format!(
                     "{},{},{policy},{},{},{}\n",
-                    METHODS[run.method as usize].name,
+                    run.method,
                     run.seed,
                     values.join(","),
                     returns.horizon_error,

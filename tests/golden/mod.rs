@@ -59,9 +59,14 @@ pub fn check_clones() {
     let mut trainer = Trainer::new(grid.clone(), Config { experts: 3, ..Config::default() }).unwrap();
     (0..60).for_each(|_| trainer.update());
     let ensemble = trainer.ensemble();
-    for (name, expected) in
-        [("replay(9)", 0x719d7a74e64356a2), ("bc(2000)", 0xd23e8d7f28e12908), ("bc_counts(2000)", 0x2ee9b7d1724de020), ("filtered", 0x7f9b27b28974f7a6), ("history_k(2)", 0xdd674fc1b158ec11), ("gru(2)", 0x074430dfb8646009)]
-    {
+    for (name, expected) in [
+        ("replay(9)", 0x719d7a74e64356a2),
+        ("bc(2000)", 0xd23e8d7f28e12908),
+        ("bc_counts(2000)", 0x2ee9b7d1724de020),
+        ("filtered", 0x7f9b27b28974f7a6),
+        ("history_k(2)", 0xdd674fc1b158ec11),
+        ("gru(2)", 0x074430dfb8646009),
+    ] {
         let choice: AttackerChoice = name.parse().unwrap();
         let target = Target { grid: &grid, ensemble: &ensemble, horizon: 30, seed: 5 };
         let clone = choice.clone_of(&target, &mut |_| true).unwrap();

@@ -8,9 +8,11 @@ pub mod table1;
 use egui::{ProgressBar, RichText, Ui};
 
 use super::app::App;
+use super::numbers;
+use super::table::Cell;
 use super::theme::Palette;
 use crate::attack::AttackerChoice;
-use crate::experiment::{Outcome, Task};
+use crate::experiment::{Outcome, Summary, Task};
 use crate::lab::{Pool, TaskEvent, TaskId};
 
 /// Tasks under way, and what has come of them.
@@ -145,4 +147,24 @@ fn introduce(ui: &mut Ui, title: &str, text: &str) {
     ui.label(RichText::new(title).heading());
     ui.label(RichText::new(text).color(Palette::of(ui).muted));
     ui.add_space(4.0);
+}
+
+/// A figure over seeds, as mean ± standard deviation; its interval is in the hint.
+fn summary_cell(summary: &Summary, is_steps: bool) -> Cell {
+    let number = |value: f64| if is_steps { numbers::short(value) } else { numbers::percent(value) };
+    let Summary { mean, sd, low, high, seeds } = *summary;
+    let spread = if is_steps { numbers::short(sd) } else { format!("{:.0} %", 100.0 * sd) };
+    let text = if seeds > 1 { format!("{} ± {spread}", number(mean)) } else { number(mean) };
+    let hint = format!("95 % bootstrap interval {} to {}, {seeds} seeds", number(low), number(high));
+    Cell::number(mean, text).hover(&hint)
+}
+
+/// A figure of the paper's, mean and standard deviation, where it has one.
+fn paper_cell(figure: Option<(f64, f64)>, palette: &Palette) -> Cell {
+    match figure {
+        Some((mean, sd)) => {
+            Cell::number(mean, format!("{} ± {sd:.2}", numbers::decimal(mean, 2))).colored(palette.muted)
+        }
+        None => Cell::number(f64::NEG_INFINITY, String::new()),
+    }
 }

@@ -2,7 +2,7 @@
 
 use egui::{DragValue, RichText, TextEdit, Ui, vec2};
 
-use super::{Batch, exports, introduce};
+use super::{Batch, exports, introduce, paper_cell, summary_cell};
 use crate::experiment::{Outcome, Setup, Summary, Sweep, SweepPoint, Task};
 use crate::lab::{TaskEvent, TaskId};
 use crate::mdp::RETURN_KINDS;
@@ -180,32 +180,15 @@ fn show_table(ui: &mut Ui, sweep: &Sweep, kind: usize) {
         Column::new("paper: clone, uncapped", "The same table; only hitting times without a cut can be so long"),
     ];
     let is_steps = RETURN_KINDS[kind].is_steps;
-    let cell = |summary: &Summary| {
-        let number = |value: f64| if is_steps { numbers::short(value) } else { numbers::percent(value) };
-        let Summary { mean, sd, low, high, seeds } = *summary;
-        let spread = if is_steps { numbers::short(sd) } else { format!("{:.0} %", 100.0 * sd) };
-        let text = if seeds > 1 { format!("{} ± {spread}", number(mean)) } else { number(mean) };
-        Cell::number(mean, text).hover(&format!(
-            "95 % bootstrap interval {} to {}, {seeds} seeds",
-            number(low),
-            number(high)
-        ))
-    };
     let rows = sweep.points(kind).into_iter().map(|point| {
         let paper = Sweep::PAPER.iter().find(|(beta, _)| *beta == point.beta);
-        let of_paper = |value: Option<(f64, f64)>| match value {
-            Some((mean, sd)) => {
-                Cell::number(mean, format!("{} ± {sd:.2}", numbers::decimal(mean, 2))).colored(palette.muted)
-            }
-            None => Cell::number(f64::NEG_INFINITY, String::new()),
-        };
         vec![
             Cell::number(point.beta, point.beta.to_string()),
-            cell(&point.ensemble),
-            cell(&point.clone),
-            cell(&point.occupancy),
-            of_paper(paper.map(|(_, paper)| paper.ensemble)),
-            of_paper(paper.map(|(_, paper)| paper.clone)),
+            summary_cell(&point.ensemble, is_steps),
+            summary_cell(&point.clone, is_steps),
+            summary_cell(&point.occupancy, is_steps),
+            paper_cell(paper.map(|(_, paper)| paper.ensemble), palette),
+            paper_cell(paper.map(|(_, paper)| paper.clone), palette),
         ]
     });
     table(ui, "sweep table", &columns, rows.collect());

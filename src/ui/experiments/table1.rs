@@ -2,13 +2,12 @@
 
 use egui::{DragValue, RichText, Ui};
 
-use super::{Batch, choose_cloners, exports, introduce};
+use super::{Batch, choose_cloners, exports, introduce, paper_cell, summary_cell};
 use crate::attack::AttackerChoice;
-use crate::experiment::{METHODS, Outcome, Summary, Table1, Task};
+use crate::experiment::{METHODS, Outcome, Setup, Table1, Task};
 use crate::lab::{TaskEvent, TaskId};
 use crate::mdp::RETURN_KINDS;
 use crate::ui::app::App;
-use crate::ui::numbers;
 use crate::ui::table::{Cell, Column, table};
 use crate::ui::theme::Palette;
 
@@ -48,7 +47,7 @@ impl Table1Tab {
             ui.add(DragValue::new(&mut self.seeds).range(1..=100).speed(0.1)).accessible_name("Seeds");
             let is_running = self.batch.as_ref().is_some_and(Batch::is_running);
             if ui.add_enabled(!is_running, egui::Button::new("Make Table 1")).clicked() {
-                let setup = crate::experiment::Setup { ensemble: None, ..app.setup().clone() };
+                let setup = Setup { ensemble: None, ..app.setup().clone() };
                 self.columns = self.cloners.clone();
                 let task = |setup| Task::Table1 { setup: Box::new(setup), attackers: self.columns.clone() };
                 let tasks = Table1::setups(&setup, self.seeds).into_iter().map(task).collect();
@@ -98,37 +97,23 @@ fn show_table(ui: &mut Ui, made: &Table1, kind: usize) {
     columns.push(Column::new("paper: clone", "The paper's Table 1, by behaviour cloning"));
     columns.extend(made.attackers.iter().map(|cloner| Column::new(&cloner.to_string(), cloner.model().summary)));
     let is_steps = RETURN_KINDS[kind].is_steps;
-    let written = |summary: &Summary, is_steps: bool| {
-        let number = |value: f64| if is_steps { numbers::short(value) } else { numbers::percent(value) };
-        let Summary { mean, sd, low, high, seeds } = *summary;
-        let spread = if is_steps { numbers::short(sd) } else { format!("{:.0} %", 100.0 * sd) };
-        let text = if seeds > 1 { format!("{} ± {spread}", number(mean)) } else { number(mean) };
-        let hover = format!("95 % bootstrap interval {} to {}, {seeds} seeds", number(low), number(high));
-        Cell::number(mean, text).hover(&hover)
-    };
     let rows = rows.iter().zip(&within).map(|(row, within)| {
         let method = &METHODS[row.method];
         let mut cells = vec![
             Cell::number(row.method as f64, method.title.to_owned()).hover(method.summary),
-            written(&row.ensemble, is_steps),
+            summary_cell(&row.ensemble, is_steps),
         ];
-        let paper = |value: Option<(f64, f64)>| match value {
-            Some((mean, sd)) => {
-                Cell::number(mean, format!("{} ± {sd:.2}", numbers::decimal(mean, 2))).colored(palette.muted)
-            }
-            None => Cell::number(f64::NEG_INFINITY, String::new()),
-        };
-        cells.push(paper(method.paper.as_ref().map(|paper| paper.ensemble)));
-        cells.push(paper(method.paper.as_ref().map(|paper| paper.clone)));
+        cells.push(paper_cell(method.paper.as_ref().map(|paper| paper.ensemble), palette));
+        cells.push(paper_cell(method.paper.as_ref().map(|paper| paper.clone), palette));
         for (clone, within) in row.clones.iter().zip(&within.clones) {
             cells.push(match (clone, within) {
                 (Some(clone), _) => {
-                    let cell = written(clone, is_steps);
+                    let cell = summary_cell(clone, is_steps);
                     let is_lost = is_steps && clone.mean < row.ensemble.mean - 5.0;
                     if is_lost { cell.colored(palette.clone) } else { cell }
                 }
                 (None, Some(within)) => {
-                    let cell = written(within, true).suffix(" in T");
+                    let cell = summary_cell(within, true).suffix(" in T");
                     cell.hover("A clone with a memory has no hitting times to cap: its return within T stands here.")
                 }
                 (None, None) => Cell::number(f64::NEG_INFINITY, "–".to_owned()),
