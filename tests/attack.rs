@@ -5,7 +5,7 @@ use std::sync::LazyLock;
 
 use ape_lab::ape::observer::Posterior;
 use ape_lab::ape::{Config, Ensemble, Trainer};
-use ape_lab::attack::{AttackerChoice, Cloned, Target, simulate};
+use ape_lab::attack::{AttackerChoice, Cloned, TRIALS, Target, simulate};
 use ape_lab::experiment::{Preset, ensemble_returns};
 use ape_lab::mdp::{ACTIONS, Grid, GridSpec, Policy, Starts, occupancy};
 use rand::{RngExt, SeedableRng};
@@ -113,7 +113,7 @@ fn exact_bayes_has_the_ensembles_law() {
     let random = random_ensemble(&slippery, 3, 5);
     for (grid, ensemble) in [(&*GRID, &*BLIND), (&slippery, &random)] {
         let target = Target { grid, ensemble, horizon: T, seed: 11 };
-        let (_, played) = simulate(&target, &Posterior::new(ensemble), &mut |_| true).unwrap();
+        let (_, played) = simulate(&target, &Posterior::new(ensemble), TRIALS, &mut |_| true).unwrap();
         let own = ensemble_returns(grid, ensemble, T);
         // Twice the 95 % interval is nearly four standard errors.
         let off = (played.horizon_return - own.horizon_return).abs();

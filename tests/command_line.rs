@@ -103,7 +103,9 @@ fn presets_are_listed() {
 #[test]
 fn bad_flags_get_one_sentence() {
     assert!(complaint(&["train", "--beta", "5"]).contains("--beta 5: must be a number from 0 to 2"));
-    assert!(complaint(&["train", "--observer", "me"]).contains("one of uniform, occupancy, replay(60), history"));
+    assert!(
+        complaint(&["train", "--observer", "me"]).contains("one of uniform, occupancy, replay(60), history, gru(4)")
+    );
     assert!(
         complaint(&["train", "--preset", "none"]).contains("blind, paper, exact, price, lure, no-protection, trap")
     );
@@ -118,6 +120,8 @@ fn bad_flags_get_one_sentence() {
     assert!(outside.contains("adversary_reward 10,0: must be a cell of the grid of 10 × 10"), "{outside}");
     let memory = complaint(&["train", "--algorithm", "exact", "--observer", "history"]);
     assert!(memory.contains("observer history: must be uniform or occupancy with the algorithm exact"), "{memory}");
+    let reward = complaint(&["train", "--adversary-reward", "stay=1", "--observer", "gru"]);
+    assert!(reward.contains("observer gru(4): must be one whose clone is exact"), "{reward}");
     assert!(complaint(&["table1", "--observer", "history"]).contains("needs one without a memory"));
     assert!(complaint(&["table1", "--seeds", "0"]).contains("--seeds 0: must be a whole number from 1 to 1000"));
     assert!(complaint(&["sweep", "--betas", "0:3:1"]).contains("--betas 0:3:1: must be FIRST:LAST:STEP"));

@@ -4,6 +4,7 @@ use std::hash::Hasher;
 
 use super::adam::Adam;
 use super::exact_ape::ExactApe;
+use super::observer::Memory;
 use super::pg_ape::PgApe;
 use super::{AlgorithmKind, Config, ConfigError, Contexts, Ensemble};
 use crate::mdp::{ACTIONS, Grid, Policy};
@@ -47,6 +48,11 @@ pub trait Algorithm: Send {
 
     /// p(c|s) of the run's observer as it stands; of one with a memory, at the start of an episode.
     fn contexts(&mut self) -> Contexts;
+
+    /// What the run's observer makes of the clone's own episode, where it has a memory.
+    fn memory(&self) -> Option<Box<dyn Memory>> {
+        None
+    }
 
     /// What is learned besides the logits.
     fn values(&self) -> &[f64] {
@@ -102,6 +108,11 @@ impl Trainer {
     /// p(c|s) of the run's observer as it stands; of one with a memory, at the start of an episode.
     pub fn contexts(&mut self) -> Contexts {
         self.algorithm.contexts()
+    }
+
+    /// What the run's observer makes of the clone's own episode, where it has a memory.
+    pub fn memory(&self) -> Option<Box<dyn Memory>> {
+        self.algorithm.memory()
     }
 
     /// A number that two runs share only when all their parameters agree to the last bit.

@@ -152,6 +152,9 @@ impl Config {
         if self.algorithm == AlgorithmKind::Exact && !has_formula {
             return observer("uniform or occupancy with the algorithm exact, which needs a formula for p(c|s)");
         }
+        if self.adversary_reward.is_some() && self.observer.model().name == "gru" {
+            return observer("one whose clone is exact with an adversary_reward, of which the clone's share is told");
+        }
         if self.gradient == GradientKind::Mixture && self.observer.model().remembers {
             return observer("one without a memory with the gradient mixture, which needs a p(c|s)");
         }

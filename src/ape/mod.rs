@@ -13,6 +13,7 @@ mod fields;
 mod figures;
 pub mod observer;
 mod pg_ape;
+mod recurrent;
 mod reward;
 
 pub use adam::Adam;
@@ -25,4 +26,5 @@ pub use exact_ape::{ExactApe, ExactGradient};
 pub use fields::{ConfigError, FIELDS, Field, Kind};
 pub use figures::{Figures, Identity};
 pub use pg_ape::{Gradient, PgApe};
+pub use recurrent::{Labelled, Network};
 pub use reward::AdversaryReward;

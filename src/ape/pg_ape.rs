@@ -14,7 +14,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use super::adam::Adam;
 use super::algorithm::{Algorithm, Experts};
 use super::demonstrate::{ContextDraw, Demonstrator, Episode, action_draws};
-use super::observer::Observer;
+use super::observer::{Memory, Observer};
 use super::{BaselineKind, Config, Contexts, Ensemble, GradientKind, ReturnToGo};
 use crate::mdp::{ACTIONS, Grid, Starts};
 
@@ -299,6 +299,10 @@ impl Algorithm for PgApe {
     fn contexts(&mut self) -> Contexts {
         let ensemble = self.experts.ensemble();
         self.observer.contexts(&self.experts.grid, &ensemble, self.experts.config.horizon)
+    }
+
+    fn memory(&self) -> Option<Box<dyn Memory>> {
+        self.observer.memory(&self.experts.ensemble())
     }
 
     fn values(&self) -> &[f64] {

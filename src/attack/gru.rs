@@ -4,17 +4,16 @@
 use rand::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-use super::recurrent::{Labelled, Network};
-use super::{Attacker, Cloned, Progress, Target, simulate};
-use crate::ape::observer::Memory;
-use crate::ape::{Contexts, Demonstrator, Episode, Parameter};
+use super::{Attacker, Cloned, Progress, TRIALS, Target, simulate};
+use crate::ape::observer::UNITS;
+use crate::ape::{Demonstrator, Episode, Labelled, Network};
 
 pub const ATTACKER: Attacker = Attacker {
     name: "gru",
     title: "learned memory, as the paper's",
     summary: "p(c|τ) by a GRU over its episode's cells, concatenated with the cell, a dense layer of 128 and a softmax; trained \
               on labelled demonstrations. Simulated, with a 95 % interval; drawn as at the start of an episode.",
-    parameter: Some(Parameter { meaning: "recurrent units", default: 4, low: 1, high: 32 }),
+    parameter: Some(UNITS),
     usual: &[4],
     is_quick: false,
     remembers: true,
@@ -28,16 +27,6 @@ const MOST_STEPS: u32 = 400_000;
 const EPOCHS: u32 = 5;
 /// Share of the work that is training.
 const TRAINING: f64 = 0.8;
-
-impl Memory for Network {
-    fn start(&self) -> Vec<f64> {
-        Network::start(self)
-    }
-
-    fn see(&self, memory: &mut [f64], state: usize, p: &mut [f64]) {
-        Network::see(self, memory, state, p);
-    }
-}
 
 fn clone(target: &Target, units: u32, progress: &mut Progress) -> Option<Cloned> {
     let Target { grid, ensemble, horizon, seed } = *target;
@@ -54,13 +43,8 @@ fn clone(target: &Target, units: u32, progress: &mut Progress) -> Option<Cloned>
     if !network.train(&episodes, EPOCHS, &mut rng, &mut |done| progress(TRAINING * done)) {
         return None;
     }
-    let (steps, returns) = simulate(target, &network, &mut |done| progress(TRAINING + (1.0 - TRAINING) * done))?;
-    let mut p = Vec::with_capacity(grid.cells() * ensemble.experts());
-    for state in 0..grid.cells() {
-        let mut row = vec![0.0; ensemble.experts()];
-        network.see(&mut Network::start(&network), state, &mut row);
-        p.extend(row);
-    }
-    let contexts = Contexts::from_weights(grid.cells(), ensemble.experts(), |s, c| p[s * ensemble.experts() + c]);
+    let (steps, returns) =
+        simulate(target, &network, TRIALS, &mut |done| progress(TRAINING + (1.0 - TRAINING) * done))?;
+    let contexts = network.at_start(grid.cells(), ensemble.experts());
     Some(Cloned { policy: ensemble.cloned(&contexts), contexts: Some(contexts), steps, returns, pairs: Some(pairs) })
 }

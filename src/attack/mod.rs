@@ -13,16 +13,14 @@ mod gru;
 mod history;
 mod history_k;
 mod limits;
-mod recurrent;
 mod simulate;
 
 use serde::{Deserialize, Serialize};
 
-pub use recurrent::{Labelled, Network};
-pub use simulate::simulate;
+pub use simulate::{TRIALS, simulate};
 
 use crate::ape::observer::ObserverChoice;
-use crate::ape::{Choice, Contexts, Ensemble, Model, Parameter};
+use crate::ape::{Choice, Contexts, Ensemble, Model, Parameter, Trainer};
 use crate::mdp::{Grid, KnownReturns, Policy, Solver, Value};
 
 /// What is attacked.
@@ -60,6 +58,25 @@ impl Cloned {
     /// The clone of p(c|s), evaluated exactly.
     pub fn mixture(target: &Target, contexts: Contexts) -> Cloned {
         Cloned::stationary(target, target.ensemble.cloned(&contexts), Some(contexts), None)
+    }
+}
+
+/// The clone by a run's own observer, who has watched the training and so knows more than one that begins now. One that
+/// learns to remember is tried in a thousand episodes.
+pub fn own_clone(trainer: &mut Trainer) -> Cloned {
+    const FEW_TRIALS: usize = 1000;
+    let (ensemble, contexts) = (trainer.ensemble(), trainer.contexts());
+    let config = trainer.config();
+    let target = Target { grid: trainer.grid(), ensemble: &ensemble, horizon: config.horizon, seed: config.seed };
+    let own = AttackerChoice::of(config.observer);
+    match trainer.memory() {
+        None => Cloned::mixture(&target, contexts),
+        Some(_) if own.model().is_quick => own.clone_of(&target, &mut |_| true).expect("it was not told to stop"),
+        Some(memory) => {
+            let tried = simulate(&target, &*memory, FEW_TRIALS, &mut |_| true);
+            let (steps, returns) = tried.expect("it was not told to stop");
+            Cloned { policy: ensemble.cloned(&contexts), contexts: Some(contexts), steps, returns, pairs: None }
+        }
     }
 }
 

@@ -7,16 +7,21 @@ use super::{Progress, Target};
 use crate::ape::observer::Memory;
 use crate::mdp::{ACTIONS, Draw, KnownReturns, Starts};
 
-/// Episodes that are played at least, over all starts.
-const EPISODES: usize = 10_000;
+/// Episodes that a clone is tried in as a rule.
+pub const TRIALS: usize = 10_000;
 /// Standard errors to each side of a 95 % confidence interval.
 const NORMAL_95: f64 = 1.96;
 
-/// Plays the same number of episodes from every start. Returns the mean steps within T from each cell, `[S]`,
+/// Plays the same number of episodes from every start, at least `trials` and two from each. Returns the mean steps within T from each cell, `[S]`,
 /// and the returns; nothing when told to stop.
-pub fn simulate(target: &Target, memory: &dyn Memory, progress: &mut Progress) -> Option<(Vec<f64>, KnownReturns)> {
+pub fn simulate(
+    target: &Target,
+    memory: &dyn Memory,
+    trials: usize,
+    progress: &mut Progress,
+) -> Option<(Vec<f64>, KnownReturns)> {
     let Target { grid, ensemble, horizon, seed } = *target;
-    let each = EPISODES.div_ceil(grid.starts().len());
+    let each = trials.div_ceil(grid.starts().len()).max(2);
     let starts = Starts::new(grid);
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(u64::from(seed) << 32 | 0x5eed);
     let mut p = vec![0.0; ensemble.experts()];

@@ -3,7 +3,8 @@
 use serde::{Deserialize, Serialize};
 
 use crate::ape::Trainer;
-use crate::mdp::{ACTIONS, Grid, Policy, RETURN_KINDS, Returns, Solver, occupancy};
+use crate::attack::own_clone;
+use crate::mdp::{ACTIONS, Grid, KnownReturns, Policy, RETURN_KINDS, Returns, Solver, occupancy};
 
 /// A run at one update.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -12,7 +13,7 @@ pub struct CurvePoint {
     pub beta: f64,
     pub ensemble: Returns,
     /// Of the clone by the run's own observer.
-    pub clone: Returns,
+    pub clone: KnownReturns,
     /// What is collected of r̃, where the clone is to be denied that.
     pub denied: Option<Denied>,
 }
@@ -28,11 +29,10 @@ pub struct Denied {
 impl CurvePoint {
     /// Evaluates a run as it stands.
     pub fn of(trainer: &mut Trainer) -> CurvePoint {
-        let contexts = trainer.contexts();
+        let own = own_clone(trainer);
         let ensemble = trainer.ensemble();
         let (config, grid) = (trainer.config(), trainer.grid());
         let mut solver = Solver::new(grid);
-        let clone = ensemble.cloned(&contexts);
         let remembers = config.observer.model().remembers;
         let denied = config.adversary_reward.as_ref().map(|reward| {
             let reward = reward.table(grid);
@@ -40,17 +40,13 @@ impl CurvePoint {
             let by_experts: f64 = ensemble.policies().iter().map(collected).sum();
             let by_experts = by_experts / ensemble.experts() as f64;
             // A clone that remembers its episode has the ensemble's law.
-            Denied { ensemble: by_experts, clone: if remembers { by_experts } else { collected(&clone) } }
+            Denied { ensemble: by_experts, clone: if remembers { by_experts } else { collected(&own.policy) } }
         });
         CurvePoint {
             update: trainer.updates(),
             beta: config.beta,
             ensemble: Returns::mean(&ensemble.returns(&mut solver, config.horizon)),
-            clone: if remembers {
-                ensemble.law(&mut solver, config.horizon).returns
-            } else {
-                solver.evaluate(&clone, config.horizon).returns
-            },
+            clone: own.returns,
             denied,
         }
     }
@@ -64,9 +60,9 @@ impl CurvePoint {
 
     /// The point as a line of that table.
     pub fn csv_line(&self) -> String {
-        let values =
-            [self.ensemble, self.clone].into_iter().flat_map(|of| RETURN_KINDS.iter().map(move |kind| (kind.get)(&of)));
-        let values: Vec<String> = values.map(|value| value.to_string()).collect();
+        let values = [self.ensemble.into(), self.clone];
+        let values = values.iter().flat_map(|of: &KnownReturns| (0..RETURN_KINDS.len()).map(|kind| of.get(kind)));
+        let values: Vec<String> = values.map(|value| value.map_or(String::new(), |v| v.to_string())).collect();
         let denied = self.denied.map_or(",".to_owned(), |denied| format!("{},{}", denied.ensemble, denied.clone));
         format!("{},{},{},{denied}", self.update, self.beta, values.join(","))
     }

@@ -5,7 +5,7 @@
 
 use super::{CloneView, Command, Event, Exported, PolicyView, RunState, Snapshot, Started};
 use crate::ape::{Config, Ensemble, EnsembleFile, Trainer};
-use crate::attack::{AttackerChoice, Cloned, Target};
+use crate::attack::{AttackerChoice, Cloned, Target, own_clone};
 use crate::experiment::{CurvePoint, Setup};
 use crate::mdp::{Grid, Policy, Returns, Solver, optimal_policy};
 
@@ -342,14 +342,12 @@ impl Run {
         }
     }
 
-    /// The clone by the run's own observer: one that has watched the training knows more than one that begins now.
+    /// The clone by the run's own observer.
     fn own_clone(&mut self, target: &Target) -> Option<Cloned> {
         let observer = self.setup.config.observer;
         match &mut self.subject {
-            Subject::Training(trainer) if !observer.model().remembers => {
-                Some(Cloned::mixture(target, trainer.contexts()))
-            }
-            _ => AttackerChoice::of(observer).clone_of(target, &mut |_| true),
+            Subject::Training(trainer) => Some(own_clone(trainer)),
+            Subject::Given { .. } => AttackerChoice::of(observer).clone_of(target, &mut |_| true),
         }
     }
 
@@ -383,7 +381,8 @@ impl Run {
         let own = AttackerChoice::of(observer);
         let mut clones: Vec<CloneView> = Vec::new();
         for cloner in std::iter::once(own).chain(show.iter().copied()) {
-            if clones.iter().any(|clone| clone.cloner == cloner) || !cloner.model().is_quick {
+            let is_wanted = cloner == own || cloner.model().is_quick;
+            if clones.iter().any(|clone| clone.cloner == cloner) || !is_wanted {
                 continue;
             }
             let cloned = if cloner == own { self.own_clone(&target) } else { cloner.clone_of(&target, &mut |_| true) };

@@ -341,7 +341,9 @@ impl App {
     }
 
     fn slow_clones(&self) -> Vec<AttackerChoice> {
-        self.view.clones.iter().copied().filter(|cloner| !cloner.model().is_quick).collect()
+        let own = AttackerChoice::of(self.setup.config.observer);
+        let is_slow = |cloner: &AttackerChoice| *cloner != own && !cloner.model().is_quick;
+        self.view.clones.iter().copied().filter(is_slow).collect()
     }
 
     /// A clone that is not quick has been made, or not.

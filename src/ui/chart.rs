@@ -116,17 +116,19 @@ pub fn show(ui: &mut Ui, curve: &[CurvePoint], snapshot: &Snapshot, config: &Con
         ui.label(RichText::new("Over training: nothing, as this ensemble was given.").small().color(palette.muted));
         return;
     }
+    // A clone with a memory is not known by every kind of return: within T there is always one.
+    let is_known = curve.iter().all(|point| point.clone.get(view.kind).is_some());
+    let of_clone = |point: &CurvePoint| point.clone.get(view.kind).unwrap_or(point.clone.horizon_return);
     let curve_of = |name: &str, color: Color32, style: Style, value: &dyn Fn(&CurvePoint) -> f64| Curve {
         name: name.to_owned(),
         color,
         points: curve.iter().map(|point| [f64::from(point.update), value(point)]).collect(),
         style,
     };
+    let clone = format!("clone ({}{})", config.observer, if is_known { "" } else { ", within T" });
     let mut curves = vec![
         curve_of("ensemble", palette.accent, Style::Solid, &|point| (kind.get)(&point.ensemble)),
-        curve_of(&format!("clone ({})", config.observer), palette.clone, Style::Solid, &|point| {
-            (kind.get)(&point.clone)
-        }),
+        curve_of(&clone, palette.clone, Style::Solid, &of_clone),
     ];
     let is_denied = curve.iter().any(|point| point.denied.is_some());
     if is_denied {
@@ -135,7 +137,7 @@ pub fn show(ui: &mut Ui, curve: &[CurvePoint], snapshot: &Snapshot, config: &Con
     } else if kind.is_steps {
         // Eq. 3, of this kind of return.
         curves.push(curve_of("J = ensemble − β·clone", palette.muted, Style::Dashed, &|point| {
-            (kind.get)(&point.ensemble) - point.beta * (kind.get)(&point.clone)
+            (kind.get)(&point.ensemble) - point.beta * of_clone(point)
         }));
     }
     let unit = if kind.is_steps { "steps" } else { "probability" };

@@ -3,6 +3,7 @@
 //! An observer model is one file here and one line in [`OBSERVERS`]; the page's menus, the command line and
 //! the tests read that table.
 
+mod gru;
 mod history;
 mod occupancy;
 mod replay;
@@ -11,6 +12,7 @@ mod uniform;
 use rand::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 
+pub use gru::UNITS;
 pub use history::Posterior;
 
 use super::choice::{Choice, Model, Parameter};
@@ -63,7 +65,8 @@ pub struct ObserverModel {
 }
 
 /// Every observer model.
-pub static OBSERVERS: [ObserverModel; 4] = [uniform::MODEL, occupancy::MODEL, replay::MODEL, history::MODEL];
+pub static OBSERVERS: [ObserverModel; 5] =
+    [uniform::MODEL, occupancy::MODEL, replay::MODEL, history::MODEL, gru::MODEL];
 
 impl Model for ObserverModel {
     const WHAT: &'static str = "observer";
@@ -139,7 +142,7 @@ mod tests {
         for bad in ["", "bayes", "replay(0)", "replay(x)", "uniform(3)", "replay(60", "replay(99999)"] {
             let sentence = bad.parse::<ObserverChoice>().unwrap_err().to_string();
             assert!(
-                sentence.contains("uniform; occupancy; replay(contexts kept at each cell), 1 to 1000; history"),
+                sentence.contains("uniform; occupancy; replay(contexts kept at each cell), 1 to 1000; history; gru(recurrent units), 1 to 32"),
                 "{sentence}"
             );
         }

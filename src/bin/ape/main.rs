@@ -10,7 +10,7 @@ use std::process::ExitCode;
 
 use ape_lab::ape::{Ensemble, EnsembleFile, FIELDS, Field, Figures, Trainer};
 use ape_lab::experiment::{CurvePoint, Denied, PRESETS, Preset, Setup};
-use ape_lab::mdp::{Grid, HORIZON, Returns};
+use ape_lab::mdp::{Grid, HORIZON, KnownReturns};
 use clap::{Arg, ArgMatches, Command};
 use serde::Serialize;
 
@@ -177,7 +177,7 @@ struct Trained {
     /// β at the end, which `alpha` may have moved.
     beta: f64,
     /// Returns of the clone by the run's own observer.
-    clone: Returns,
+    clone: KnownReturns,
     /// With an `adversary_reward`: what an expert and the clone collect of it within T, mean over starts.
     #[serde(skip_serializing_if = "Option::is_none")]
     denied: Option<Denied>,

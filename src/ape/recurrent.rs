@@ -9,14 +9,13 @@ use std::ops::Range;
 use rand::RngExt;
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-use crate::ape::Adam;
+use super::observer::Memory;
+use super::{Adam, Contexts};
 
 /// Units of the dense layer (paper: 128).
 const DENSE: usize = 128;
 /// Largest weight before training, of either sign.
 const WEIGHT: f64 = 0.2;
-/// Episodes of one gradient.
-const MINIBATCH: usize = 32;
 /// Adam's step size at the first minibatch; it falls linearly to 0.
 const LEARNING_RATE: f64 = 0.02;
 
@@ -98,6 +97,15 @@ impl Network {
     pub fn see(&self, hidden: &mut [f64], state: usize, p: &mut [f64]) {
         self.remember(hidden, state, &mut [0.0; 4 * Self::MAX_UNITS][..4 * self.units]);
         self.judge(hidden, state, &mut [0.0; DENSE], p);
+    }
+
+    /// p(c|s) where an episode starts.
+    pub fn at_start(&self, cells: usize, experts: usize) -> Contexts {
+        let mut p = vec![0.0; cells * experts];
+        for (state, p) in p.chunks_mut(experts).enumerate() {
+            self.see(&mut Network::start(self), state, p);
+        }
+        Contexts::from_weights(cells, experts, |state, context| p[state * experts + context])
     }
 
     /// One step of the GRU (Cho et al. 2014, the reset after the recurrent weights). Leaves in `gates`,
@@ -205,21 +213,17 @@ impl Network {
         rng: &mut Xoshiro256PlusPlus,
         progress: &mut dyn FnMut(f64) -> bool,
     ) -> bool {
-        let mut adam = Adam::new(self.parameters.len());
-        let mut gradient = vec![0.0; self.parameters.len()];
-        let mut trace = Trace::default();
+        let mut learner = Learner::new(self);
         let mut shuffled: Vec<&Labelled> = episodes.iter().collect();
-        let minibatches = f64::from(epochs) * episodes.len().div_ceil(MINIBATCH) as f64;
+        let minibatches = f64::from(epochs) * episodes.len().div_ceil(Learner::MINIBATCH) as f64;
         let mut done = 0.0;
         for _ in 0..epochs {
             for last in (1..shuffled.len()).rev() {
                 // A u32 range: one of usize would draw differently on 32 and 64 bits.
                 shuffled.swap(last, rng.random_range(0..=last as u32) as usize);
             }
-            for minibatch in shuffled.chunks(MINIBATCH) {
-                gradient.fill(0.0);
-                self.gradient(minibatch, &mut gradient, &mut trace);
-                adam.ascend(&mut self.parameters, &gradient, LEARNING_RATE * (1.0 - done / minibatches));
+            for minibatch in shuffled.chunks(Learner::MINIBATCH) {
+                learner.step(self, minibatch, LEARNING_RATE * (1.0 - done / minibatches));
                 done += 1.0;
                 if !progress(done / minibatches) {
                     return false;
@@ -227,6 +231,40 @@ impl Network {
             }
         }
         true
+    }
+}
+
+impl Memory for Network {
+    fn start(&self) -> Vec<f64> {
+        Network::start(self)
+    }
+
+    fn see(&self, memory: &mut [f64], state: usize, p: &mut [f64]) {
+        Network::see(self, memory, state, p);
+    }
+}
+
+/// A network's optimiser, from one minibatch to the next.
+pub struct Learner {
+    adam: Adam,
+    gradient: Vec<f64>,
+    trace: Trace,
+}
+
+impl Learner {
+    /// Episodes of one gradient.
+    pub const MINIBATCH: usize = 32;
+
+    pub fn new(network: &Network) -> Learner {
+        let size = network.parameters.len();
+        Learner { adam: Adam::new(size), gradient: vec![0.0; size], trace: Trace::default() }
+    }
+
+    /// One step of Adam up the mean log-likelihood of a minibatch.
+    pub fn step(&mut self, network: &mut Network, minibatch: &[&Labelled], learning_rate: f64) {
+        self.gradient.fill(0.0);
+        network.gradient(minibatch, &mut self.gradient, &mut self.trace);
+        self.adam.ascend(&mut network.parameters, &self.gradient, learning_rate);
     }
 }
 
