@@ -117,12 +117,14 @@ fn bad_flags_get_one_sentence() {
     assert!(complaint(&["train", "--alpha", "5"]).contains("--alpha 5: must be none, or a return from -10000"));
     assert!(complaint(&["train", "--adversary-reward", "9;9"]).contains("must be none, or rewards as 9,9=-1"));
     let outside = complaint(&["train", "--adversary-reward", "10,0=1"]);
-    assert!(outside.contains("adversary_reward 10,0: must be a cell of the grid of 10 × 10"), "{outside}");
+    assert!(outside.contains("adversary_reward 10,0: must be a cell of the grid of 10 × 10 cells where a step begins"), "{outside}");
     let memory = complaint(&["train", "--algorithm", "exact", "--observer", "history"]);
     assert!(memory.contains("observer history: must be uniform or occupancy with the algorithm exact"), "{memory}");
     let reward = complaint(&["train", "--adversary-reward", "stay=1", "--observer", "gru"]);
     assert!(reward.contains("observer gru(4): must be one whose clone is exact"), "{reward}");
     assert!(complaint(&["table1", "--observer", "history"]).contains("needs one without a memory"));
+    assert!(complaint(&["table1", "--preset", "price"]).contains("alpha -14: must be none where runs are compared"));
+    assert!(complaint(&["sweep", "--out", "/no/such/folder/x.csv"]).contains("there is no folder /no/such/folder"));
     assert!(complaint(&["table1", "--seeds", "0"]).contains("--seeds 0: must be a whole number from 1 to 1000"));
     assert!(complaint(&["sweep", "--betas", "0:3:1"]).contains("--betas 0:3:1: must be FIRST:LAST:STEP"));
     assert!(complaint(&["attack", "/no/such/file"]).contains("/no/such/file"));

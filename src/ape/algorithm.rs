@@ -71,8 +71,12 @@ pub struct Trainer {
 impl Trainer {
     /// A run at its start.
     pub fn new(grid: Grid, config: Config) -> Result<Trainer, ConfigError> {
+        /// Least β at the start of a run under a constraint: experts that are never parted stay together.
+        const PARTING_BETA: f64 = 0.6;
         config.check()?;
         config.check_on(&grid)?;
+        let beta = if config.alpha.is_some() { config.beta.max(PARTING_BETA) } else { config.beta };
+        let config = Config { beta, ..config };
         let algorithm: Box<dyn Algorithm> = match config.algorithm {
             AlgorithmKind::PgApe => Box::new(PgApe::new(grid, config)),
             AlgorithmKind::Exact => Box::new(ExactApe::new(grid, config)),
@@ -143,12 +147,14 @@ impl Trainer {
 
 /// Dual ascent for Eq. 2, min E[clone] subject to E[ensemble] ≥ α. With the multiplier 1/β on the constraint
 /// the objective is Eq. 3 up to a factor; where the ensemble is better than it must be β may grow, where it is
-/// worse β must shrink. The step is taken on log β, in units of |α|, so that β stays positive.
+/// worse β must shrink. The step is taken on log β, in units of |α|, so that β stays positive; a long one is cut, so
+/// that the experts can follow.
 fn dual_ascent(beta: f64, ensemble_return: f64, alpha: f64) -> f64 {
-    const RATE: f64 = 0.05;
+    const RATE: f64 = 0.5;
+    const MOST: f64 = 0.05;
     const LEAST: f64 = 0.01;
-    let slack = ((ensemble_return - alpha) / alpha.abs()).clamp(-1.0, 1.0);
-    (beta.max(LEAST) * libm::exp(RATE * slack)).clamp(LEAST, Config::MAX_BETA)
+    let step = (RATE * (ensemble_return - alpha) / alpha.abs()).clamp(-MOST, MOST);
+    (beta * libm::exp(step)).clamp(LEAST, Config::MAX_BETA)
 }
 
 /// The experts of a table of logits, `[n][S][5]`: π(a) = exp θ_a / Σ exp θ, the same bits on every machine.

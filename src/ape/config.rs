@@ -163,12 +163,16 @@ impl Config {
 
     /// Checks what depends on the grid.
     pub fn check_on(&self, grid: &Grid) -> Result<(), ConfigError> {
-        match self.adversary_reward.as_ref().and_then(|reward| reward.outside(grid)) {
+        match self.adversary_reward.as_ref().and_then(|reward| reward.idle(grid)) {
             None => Ok(()),
             Some((row, col)) => Err(ConfigError {
                 field: "adversary_reward",
                 value: format!("{row},{col}"),
-                expected: format!("a cell of the grid of {} × {} cells", grid.rows(), grid.cols()),
+                expected: format!(
+                    "a cell of the grid of {} × {} cells where a step begins: no wall and not the goal",
+                    grid.rows(),
+                    grid.cols()
+                ),
             }),
         }
     }

@@ -105,15 +105,16 @@ impl ExactApe {
     }
 
     /// β of the coming update. For a small β the experts that agree are a local optimum which gradients do not
-    /// leave, while experts that were parted under a large β stay parted under a small one, at a better J. So a
-    /// run starts with β at least [`Self::PARTING_BETA`] and comes down to its own over its first half.
+    /// leave, while experts that were parted under a large β stay parted under a small one, at a better J. A
+    /// very large one, from the start, makes an expert give up. So a run starts at [`Self::PARTING_BETA`] and comes to
+    /// its own β over its first half.
     fn beta_now(&self) -> f64 {
         let Config { beta, alpha, exact_updates, .. } = self.experts.config;
         if beta == 0.0 || alpha.is_some() {
             return beta;
         }
         let done = f64::from(self.experts.updates) / f64::from(exact_updates);
-        beta + (Self::PARTING_BETA - beta).max(0.0) * (1.0 - 2.0 * done).max(0.0)
+        beta + (Self::PARTING_BETA - beta) * (1.0 - 2.0 * done).max(0.0)
     }
 }
 

@@ -286,7 +286,7 @@ pub static FIELDS: [Field; 19] = [
         label: "Constraint α (steps)",
         paper: Some("none"),
         help: "Eq. 2: minimise the clone's return while the ensemble's return within T stays at least α. β then follows by dual \
-               ascent, from its value above.",
+               ascent, from its value above and at least 0.6.",
         kind: Kind::Text {
             expected: "none, or a return from -10000 to -0.1",
             get: |config| optional(&config.alpha, ToString::to_string),

@@ -22,10 +22,13 @@ impl AdversaryReward {
         "none, or rewards as 9,9=-1 (row,column) or stay=0.5 (action) with spaces between, each from -1000 to 1000";
     const MOST: f64 = 1000.0;
 
-    /// The first cell that a grid does not have.
-    pub fn outside(&self, grid: &Grid) -> Option<Cell> {
-        let outside = |&(row, col): &Cell| row as usize >= grid.rows() || col as usize >= grid.cols();
-        self.cells.iter().map(|(cell, _)| *cell).find(outside)
+    /// The first cell where no step of a grid begins: outside, a wall or the goal.
+    pub fn idle(&self, grid: &Grid) -> Option<Cell> {
+        let idle = |&(row, col): &Cell| {
+            let is_outside = row as usize >= grid.rows() || col as usize >= grid.cols();
+            is_outside || grid.starts().binary_search(&(row * grid.cols() as u32 + col)).is_err()
+        };
+        self.cells.iter().map(|(cell, _)| *cell).find(idle)
     }
 
     /// r̃(s, a), `[S][5]`; the grid must have all its cells.
@@ -111,7 +114,10 @@ mod tests {
             (table[99], table[3], table[50]),
             ([-1.0, -1.0, -1.0, -1.0, -0.5], [2.0, 2.0, 2.0, 2.0, 2.5], [0.0, 0.0, 0.0, 0.0, 0.5])
         );
-        assert_eq!("10,0=1".parse::<AdversaryReward>().unwrap().outside(&grid), Some((10, 0)));
+        assert_eq!(reward.idle(&grid), None);
+        for (text, cell) in [("5,5=1 10,0=1", (10, 0)), ("0,0=5", (0, 0))] {
+            assert_eq!(text.parse::<AdversaryReward>().unwrap().idle(&grid), Some(cell));
+        }
     }
 
     #[test]

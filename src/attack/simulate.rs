@@ -30,7 +30,11 @@ pub fn simulate(
     let (mut steps, mut success) = ([0.0; 2], [0.0; 2]);
     for (done, &start) in grid.starts().iter().enumerate() {
         let (mut sum, mut squares, mut arrived) = (0.0, 0.0, 0.0);
-        for _ in 0..each {
+        for episode in 0..each {
+            let part = (done as f64 + episode as f64 / each as f64) / grid.starts().len() as f64;
+            if episode.is_multiple_of(64) && !progress(part) {
+                return None;
+            }
             let mut state = start as usize;
             let mut remembered = memory.start();
             let mut t = 0;
@@ -58,9 +62,6 @@ pub fn simulate(
         steps[1] += (squares / n - mean * mean).max(0.0) / (n - 1.0);
         success[0] += share;
         success[1] += share * (1.0 - share) / (n - 1.0);
-        if !progress((done + 1) as f64 / grid.starts().len() as f64) {
-            return None;
-        }
     }
     let (all, free) = (grid.starts().len() as f64, grid.free_cells() as f64);
     let returns = KnownReturns {
@@ -69,7 +70,8 @@ pub fn simulate(
         horizon_return: -steps[0] / free,
         success: success[0] / all,
         horizon_error: NORMAL_95 * steps[1].sqrt() / free,
-        success_error: NORMAL_95 * success[1].sqrt() / all,
+        // Where all arrived or none did, the rule of three.
+        success_error: (NORMAL_95 * success[1].sqrt() / all).max(3.0 / (each as f64 * all)),
     };
     Some((by_cell, returns))
 }

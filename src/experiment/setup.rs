@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::ape::{Config, ConfigError, EnsembleFile};
-use crate::mdp::{Grid, GridError, GridSpec};
+use crate::mdp::{Grid, GridError, GridSpec, HORIZON};
 
 /// A grid, a configuration, and an ensemble where one is given instead of trained.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -26,6 +26,12 @@ pub enum SetupError {
 }
 
 impl Setup {
+    /// Whether the paper's figures are of this grid, number of experts and horizon.
+    pub fn is_papers(&self) -> bool {
+        let Config { experts, horizon, .. } = self.config;
+        (&self.grid, experts, horizon) == (&GridSpec::default(), 2, HORIZON)
+    }
+
     /// Reads a configuration file: the fields of [`Config`], with a `grid` where it is not the paper's. An
     /// ensemble file does too: its `grid` and `config` are taken.
     pub fn parse(text: &str) -> Result<Setup, SetupError> {

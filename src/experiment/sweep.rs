@@ -51,6 +51,13 @@ impl SweepRun {
     }
 }
 
+/// Whether runs are told apart by β: with `alpha` it moves.
+pub fn check(config: &Config) -> Result<(), String> {
+    config.alpha.map_or(Ok(()), |alpha| {
+        Err(format!("alpha {alpha}: must be none where runs are compared by their β, which it would move"))
+    })
+}
+
 /// The runs of a sweep, in order of β and seed.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Sweep {

@@ -6,7 +6,6 @@ use super::baselines::{Case, METHODS, Measure};
 use super::bench::ensemble_returns;
 use super::{Setup, Summary};
 use crate::ape::Config;
-use crate::ape::observer::ObserverChoice;
 use crate::attack::{AttackerChoice, Progress, Target};
 use crate::mdp::{Grid, KnownReturns, RETURN_KINDS, Returns};
 
@@ -128,12 +127,13 @@ impl Table1 {
     }
 }
 
-/// The observer whose clone measures the baselines has a stationary clone; one that remembers has none to match.
-pub fn check(observer: ObserverChoice) -> Result<(), String> {
+/// Whether a table can be made: the baselines must have a stationary clone to match, and methods of one β.
+pub fn check(config: &Config) -> Result<(), String> {
+    let observer = config.observer;
     if observer.model().remembers {
         return Err(format!(
             "observer {observer}: Table 1 needs one without a memory, whose clone the baselines can match"
         ));
     }
-    Ok(())
+    super::sweep::check(config)
 }

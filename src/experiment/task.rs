@@ -4,7 +4,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::bench::Attack;
-use super::sweep::SweepRun;
+use super::sweep::{self, SweepRun};
 use super::table1::{self, MethodRun};
 use super::{Clock, Setup};
 use crate::ape::EnsembleFile;
@@ -40,10 +40,13 @@ impl Task {
                     .map(|(attack, cloned)| Outcome::Attack(attack, Box::new(cloned)))
             }
             Task::Table1 { setup, attackers } => {
-                table1::check(setup.config.observer)?;
+                table1::check(&setup.config)?;
                 table1::run_seed(setup, attackers, progress)?.map(Outcome::Table1)
             }
-            Task::Sweep { setup } => SweepRun::run(setup, progress)?.map(Outcome::Sweep),
+            Task::Sweep { setup } => {
+                sweep::check(&setup.config)?;
+                SweepRun::run(setup, progress)?.map(Outcome::Sweep)
+            }
         })
     }
 }

@@ -206,9 +206,14 @@ impl App {
         self.load();
     }
 
+    /// Whether the ensemble on the page can be had from the session: it is there, and shows what it has.
+    pub fn can_export(&self) -> bool {
+        self.shown.is_some() && matches!(self.session, Session::Ready) && !self.is_retraining()
+    }
+
     /// Asks the session for the ensemble.
     pub fn want(&mut self, wanted: Wanted) {
-        if !self.wanted.contains(&wanted) {
+        if self.can_export() && !self.wanted.contains(&wanted) {
             self.wanted.push(wanted);
             self.send(Command::Export);
         }
@@ -275,6 +280,10 @@ impl App {
             match event {
                 Ok(Event::Ready { protocol }) if protocol == PROTOCOL => {
                     self.session = Session::Ready;
+                    // Of a session that is gone nothing comes any more, and its runs had other numbers.
+                    self.wanted.clear();
+                    self.made.clear();
+                    self.making.drain(..).for_each(|(id, ..)| self.pool.cancel(id));
                     self.send(Command::Speed(toolbar::SPEEDS[self.view.speed]));
                     self.send(Command::Show(self.view.clones.clone()));
                     self.load();
@@ -286,7 +295,10 @@ impl App {
                 Ok(Event::Started(started)) => self.begun = Some(*started),
                 Ok(Event::Snapshot(snapshot)) => self.take(*snapshot),
                 Ok(Event::Exported(exported)) => self.take_ensemble(*exported),
-                Ok(Event::Refused(sentence)) => self.notice = Some(sentence),
+                Ok(Event::Refused(sentence)) => {
+                    self.wanted.clear();
+                    self.notice = Some(sentence);
+                }
                 Err(sentence) => {
                     self.session = Session::Failed(sentence);
                     self.begun = None;

@@ -13,7 +13,7 @@ use ape_lab::mdp::RETURN_KINDS;
 use clap::{Arg, ArgAction, ArgMatches, Command};
 use rayon::prelude::*;
 
-use super::{ensemble_file, print, setup, with_setup, write};
+use super::{check_out, ensemble_file, print, setup, with_setup, write};
 
 /// Every command of this file.
 pub fn commands() -> [Command; 4] {
@@ -37,12 +37,15 @@ pub fn commands() -> [Command; 4] {
             .arg(Arg::new("seed").long("seed").value_name("N").default_value("1").help("Seed of the attacks"))
             .arg(json())
             .arg(out("Write the table to this CSV file")),
-        with_setup(Command::new("table1").about("The paper's Table 1, with every cloner as a column"), &["seed"])
-            .arg(seeds("5"))
-            .arg(attackers())
-            .arg(json())
-            .arg(out("Write every run to this CSV file")),
-        with_setup(Command::new("sweep").about("Ensemble and clone for many β"), &["seed", "beta"])
+        with_setup(
+            Command::new("table1").about("The paper's Table 1, with every cloner as a column"),
+            &["seed", "algorithm", "alpha"],
+        )
+        .arg(seeds("5"))
+        .arg(attackers())
+        .arg(json())
+        .arg(out("Write every run to this CSV file")),
+        with_setup(Command::new("sweep").about("Ensemble and clone for many β"), &["seed", "beta", "alpha"])
             .arg(
                 Arg::new("betas")
                     .long("betas")
@@ -110,6 +113,7 @@ fn attackers(matches: &ArgMatches) -> Result<Vec<AttackerChoice>, String> {
 }
 
 pub fn attack(matches: &ArgMatches) -> Result<(), String> {
+    check_out(matches, "out")?;
     let (grid, ensemble, horizon) = ensemble_file(matches)?;
     let seed = number(matches, "seed", 0, u32::MAX)?;
     let file = Box::new(EnsembleFile::new(&grid, &ensemble, None));
@@ -132,17 +136,26 @@ pub fn attack(matches: &ArgMatches) -> Result<(), String> {
         if error > 0.0 { format!("{value:.decimals$} ± {error:.decimals$}") } else { format!("{value:.decimals$}") }
     };
     let r = &bench.ensemble;
-    println!(
+    say!(
         "ensemble: capped return {:.2}, within T = {horizon} steps {:.2}, success {:.3}",
-        r.capped_return, r.horizon_return, r.success
+        r.capped_return,
+        r.horizon_return,
+        r.success
     );
-    println!(
+    say!(
         "\n{:<20} {:>9} {:>9} {:>16} {:>16} {:>9} {:>10} {:>8}",
-        "attacker", "capped", "drop", "within T", "success", "gap", "pairs", "seconds"
+        "attacker",
+        "capped",
+        "drop",
+        "within T",
+        "success",
+        "gap",
+        "pairs",
+        "seconds"
     );
     for attack in &bench.attackers {
         let r = &attack.returns;
-        println!(
+        say!(
             "{:<20} {:>9} {:>9} {:>16} {:>16} {:>9.2} {:>10} {:>8.2}",
             attack.attacker.to_string(),
             known(r.capped_return),
@@ -154,7 +167,7 @@ pub fn attack(matches: &ArgMatches) -> Result<(), String> {
             attack.seconds
         );
     }
-    println!(
+    say!(
         "\ncapped, drop: mean hitting times cut at 100 steps a cell, and what the clone loses by them (unknown of a clone with a memory); gap: the same of returns within T."
     );
     Ok(())
@@ -174,7 +187,9 @@ pub fn make_table1(setup: &Setup, seeds: u32, attackers: Vec<AttackerChoice>) ->
 }
 
 pub fn table1(matches: &ArgMatches) -> Result<(), String> {
-    let table = make_table1(&setup(matches)?, number(matches, "seeds", 1, 1000)?, attackers(matches)?)?;
+    check_out(matches, "out")?;
+    let setup = setup(matches)?;
+    let table = make_table1(&setup, number(matches, "seeds", 1, 1000)?, attackers(matches)?)?;
     if let Some(file) = matches.get_one::<String>("out") {
         write(file, &table.csv())?;
     }
@@ -182,22 +197,25 @@ pub fn table1(matches: &ArgMatches) -> Result<(), String> {
         return print(&table);
     }
     for kind in [0, 2] {
-        println!(
+        say!(
             "{} ({}), mean ± sd [95 % bootstrap interval] over seeds",
-            RETURN_KINDS[kind].name, RETURN_KINDS[kind].label
+            RETURN_KINDS[kind].name,
+            RETURN_KINDS[kind].label
         );
         let with_paper = |value: Option<(f64, f64)>| {
-            value.filter(|_| kind == 0).map_or(String::new(), |(mean, sd)| format!("  (paper {mean:.2} ± {sd:.2})"))
+            value
+                .filter(|_| kind == 0 && setup.is_papers())
+                .map_or(String::new(), |(mean, sd)| format!("  (paper {mean:.2} ± {sd:.2})"))
         };
         for row in table.rows(kind) {
             let method = &METHODS[row.method];
             let paper = method.paper.as_ref();
-            println!("{}", method.title);
-            println!("  {:<18} {}{}", "ensemble", shown(&row.ensemble), with_paper(paper.map(|paper| paper.ensemble)));
+            say!("{}", method.title);
+            say!("  {:<18} {}{}", "ensemble", shown(&row.ensemble), with_paper(paper.map(|paper| paper.ensemble)));
             for (attacker, clone) in table.attackers.iter().zip(&row.clones) {
                 let Some(clone) = clone else { continue };
                 let bc = attacker.model().name == "bc";
-                println!(
+                say!(
                     "  {:<18} {}{}",
                     attacker.to_string(),
                     shown(clone),
@@ -205,7 +223,7 @@ pub fn table1(matches: &ArgMatches) -> Result<(), String> {
                 );
             }
         }
-        println!();
+        say!("");
     }
     Ok(())
 }
@@ -227,6 +245,7 @@ pub fn make_sweep(setup: &Setup, betas: &[f64], seeds: u32) -> Result<Sweep, Str
 }
 
 pub fn sweep(matches: &ArgMatches) -> Result<(), String> {
+    check_out(matches, "out")?;
     let betas = matches.get_one::<String>("betas").expect("it has a default");
     let betas = Sweep::betas(betas).map_err(|error| format!("--{error}"))?;
     let sweep = make_sweep(&setup(matches)?, &betas, number(matches, "seeds", 1, 1000)?)?;
@@ -237,9 +256,9 @@ pub fn sweep(matches: &ArgMatches) -> Result<(), String> {
         return print(&sweep);
     }
     for kind in [0, 2] {
-        println!("{}, mean ± sd [95 % bootstrap interval] over seeds", RETURN_KINDS[kind].name);
+        say!("{}, mean ± sd [95 % bootstrap interval] over seeds", RETURN_KINDS[kind].name);
         for point in sweep.points(kind) {
-            println!("  β = {:<5} ensemble {}   clone {}", point.beta, shown(&point.ensemble), shown(&point.clone));
+            say!("  β = {:<5} ensemble {}   clone {}", point.beta, shown(&point.ensemble), shown(&point.clone));
         }
     }
     Ok(())
@@ -247,13 +266,13 @@ pub fn sweep(matches: &ArgMatches) -> Result<(), String> {
 
 pub fn results(matches: &ArgMatches) -> Result<(), String> {
     let folder = Path::new(matches.get_one::<String>("folder").expect("it has a default"));
-    let files = ape_lab::report::results(&|tasks| run_all(tasks))?;
     let pictures = folder.join("results");
     std::fs::create_dir_all(&pictures).map_err(|error| format!("{}: {error}", pictures.display()))?;
+    let files = ape_lab::report::results(&|tasks| run_all(tasks))?;
     for (name, text) in &files {
         let path = folder.join(name);
         write(&path.to_string_lossy(), text)?;
-        println!("{}: {} bytes", path.display(), text.len());
+        say!("{}: {} bytes", path.display(), text.len());
     }
     Ok(())
 }

@@ -3,8 +3,14 @@
 //!
 //! Results go to standard output. Bad input gets one line on standard error and exit code 2.
 
+/// Prints a line on standard output.
+macro_rules! say {
+    ($($text:tt)*) => { $crate::print_line(format_args!($($text)*)) };
+}
+
 mod experiments;
 
+use std::io::Write;
 use std::path::Path;
 use std::process::ExitCode;
 
@@ -111,9 +117,27 @@ fn write(file: &str, text: &str) -> Result<(), String> {
     })
 }
 
+/// Prints a line; who reads it may have read enough and gone, which is no failure.
+fn print_line(line: std::fmt::Arguments) {
+    if writeln!(std::io::stdout().lock(), "{line}").is_err() {
+        std::process::exit(0);
+    }
+}
+
+/// Whether the file that a flag names can be written to, before anything is computed for it.
+fn check_out(matches: &ArgMatches, flag: &str) -> Result<(), String> {
+    let Some(file) = matches.get_one::<String>(flag) else { return Ok(()) };
+    let folder = Path::new(file).parent().filter(|folder| !folder.as_os_str().is_empty());
+    match folder {
+        _ if Path::new(file).is_dir() => Err(format!("--{flag} {file}: is a folder, expected a file")),
+        Some(folder) if !folder.is_dir() => Err(format!("--{flag} {file}: there is no folder {}", folder.display())),
+        _ => Ok(()),
+    }
+}
+
 fn print(result: &impl Serialize) -> Result<(), String> {
     let text = serde_json::to_string_pretty(result).map_err(|error| error.to_string())?;
-    println!("{text}");
+    say!("{text}");
     Ok(())
 }
 
@@ -134,7 +158,7 @@ fn evaluate(matches: &ArgMatches) -> Result<(), String> {
 
 fn presets() -> Result<(), String> {
     for preset in &PRESETS {
-        println!("{:<14} {}", preset.name, preset.summary);
+        say!("{:<14} {}", preset.name, preset.summary);
     }
     Ok(())
 }
@@ -186,6 +210,8 @@ struct Trained {
 }
 
 fn train(matches: &ArgMatches) -> Result<(), String> {
+    check_out(matches, "out")?;
+    check_out(matches, "curve")?;
     let Setup { grid, config, .. } = setup(matches)?;
     let horizon = config.horizon;
     let grid = Grid::new(grid).map_err(|error| error.to_string())?;

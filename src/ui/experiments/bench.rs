@@ -82,7 +82,8 @@ impl BenchTab {
         ui.checkbox(&mut self.has_learning_curve, "learning curve: behaviour cloning from 100 to 1,000,000 pairs");
         ui.horizontal_wrapped(|ui| {
             let is_running = self.batch.as_ref().is_some_and(Batch::is_running);
-            let can_run = !is_running && app.shown().is_some() && app.is_session_alive();
+            let has_cloners = !self.cloners.is_empty() || self.has_learning_curve;
+            let can_run = !is_running && has_cloners && app.can_export();
             if ui.add_enabled(can_run, egui::Button::new("Attack the ensemble shown")).clicked() {
                 app.want(Wanted::Bench);
             }
@@ -93,7 +94,7 @@ impl BenchTab {
             {
                 app.ask_for_file();
             }
-            if ui.add_enabled(app.shown().is_some(), egui::Button::new("Save the ensemble")).clicked() {
+            if ui.add_enabled(app.can_export(), egui::Button::new("Save the ensemble")).clicked() {
                 app.want(Wanted::Save);
             }
             let bench = self.bench();

@@ -27,9 +27,11 @@ pub struct Batch {
 
 impl Batch {
     pub fn begin(pool: &mut Pool, tasks: Vec<Task>, now: f64) -> Batch {
+        // Nothing to do is done.
+        let ended = tasks.is_empty().then_some(now);
         let outcomes = tasks.iter().map(|_| None).collect();
         let tasks = tasks.into_iter().map(|task| (pool.begin(task), 0.0)).collect();
-        Batch { tasks, outcomes, begun: now, ended: None, failure: None }
+        Batch { tasks, outcomes, begun: now, ended, failure: None }
     }
 
     /// Takes in news of one of its tasks; of others none.

@@ -20,11 +20,20 @@ pub struct SweepTab {
     is_pareto: bool,
     batch: Option<Batch>,
     refusal: Option<String>,
+    /// Whether the paper's figures are of the same setting.
+    is_papers: bool,
 }
 
 impl Default for SweepTab {
     fn default() -> Self {
-        SweepTab { betas: "0:1:0.1".to_owned(), seeds: 3, is_pareto: false, batch: None, refusal: None }
+        SweepTab {
+            betas: "0:1:0.1".to_owned(),
+            seeds: 3,
+            is_pareto: false,
+            batch: None,
+            refusal: None,
+            is_papers: false,
+        }
     }
 }
 
@@ -95,7 +104,7 @@ impl SweepTab {
         } else {
             show_over_beta(ui, &points, kind)
         }
-        show_table(ui, &sweep, kind);
+        show_table(ui, &sweep, kind, self.is_papers);
     }
 
     fn begin(&mut self, app: &mut App, now: f64) {
@@ -107,6 +116,7 @@ impl SweepTab {
             Ok(betas) => {
                 self.refusal = None;
                 let setup = Setup { ensemble: None, ..app.setup().clone() };
+                self.is_papers = setup.is_papers();
                 let task = |setup| Task::Sweep { setup: Box::new(setup) };
                 let tasks = Sweep::setups(&setup, &betas, self.seeds).into_iter().map(task).collect();
                 self.batch = Some(Batch::begin(&mut app.pool, tasks, now));
@@ -169,7 +179,7 @@ fn draw(
     chart::plot(ui, Axes { id: "sweep", size, include: Vec::new(), x, y, labels }, curves);
 }
 
-fn show_table(ui: &mut Ui, sweep: &Sweep, kind: usize) {
+fn show_table(ui: &mut Ui, sweep: &Sweep, kind: usize, is_papers: bool) {
     let palette = Palette::of(ui);
     let columns = [
         Column::new("β", "Weight of the clone's return"),
@@ -181,7 +191,7 @@ fn show_table(ui: &mut Ui, sweep: &Sweep, kind: usize) {
     ];
     let is_steps = RETURN_KINDS[kind].is_steps;
     let rows = sweep.points(kind).into_iter().map(|point| {
-        let paper = Sweep::PAPER.iter().find(|(beta, _)| *beta == point.beta);
+        let paper = Sweep::PAPER.iter().find(|(beta, _)| is_papers && *beta == point.beta);
         vec![
             Cell::number(point.beta, point.beta.to_string()),
             summary_cell(&point.ensemble, is_steps),

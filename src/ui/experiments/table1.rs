@@ -18,11 +18,13 @@ pub struct Table1Tab {
     /// The cloners of the batch.
     columns: Vec<AttackerChoice>,
     batch: Option<Batch>,
+    /// Whether the paper's figures are of the same setting.
+    is_papers: bool,
 }
 
 impl Default for Table1Tab {
     fn default() -> Self {
-        Table1Tab { cloners: AttackerChoice::usual(), seeds: 5, columns: Vec::new(), batch: None }
+        Table1Tab { cloners: AttackerChoice::usual(), seeds: 5, columns: Vec::new(), batch: None, is_papers: false }
     }
 }
 
@@ -48,6 +50,7 @@ impl Table1Tab {
             let is_running = self.batch.as_ref().is_some_and(Batch::is_running);
             if ui.add_enabled(!is_running, egui::Button::new("Make Table 1")).clicked() {
                 let setup = Setup { ensemble: None, ..app.setup().clone() };
+                self.is_papers = setup.is_papers();
                 self.columns = self.cloners.clone();
                 let task = |setup| Task::Table1 { setup: Box::new(setup), attackers: self.columns.clone() };
                 let tasks = Table1::setups(&setup, self.seeds).into_iter().map(task).collect();
@@ -70,7 +73,7 @@ impl Table1Tab {
             return;
         }
         ui.add_space(4.0);
-        show_table(ui, &made, app.view.kind);
+        show_table(ui, &made, app.view.kind, self.is_papers);
     }
 
     /// What has come so far.
@@ -85,7 +88,7 @@ impl Table1Tab {
     }
 }
 
-fn show_table(ui: &mut Ui, made: &Table1, kind: usize) {
+fn show_table(ui: &mut Ui, made: &Table1, kind: usize, is_papers: bool) {
     /// The return within T, which is known of every clone.
     const WITHIN_T: usize = 2;
     let palette = Palette::of(ui);
@@ -99,12 +102,13 @@ fn show_table(ui: &mut Ui, made: &Table1, kind: usize) {
     let is_steps = RETURN_KINDS[kind].is_steps;
     let rows = rows.iter().zip(&within).map(|(row, within)| {
         let method = &METHODS[row.method];
+        let paper = method.paper.as_ref().filter(|_| is_papers);
         let mut cells = vec![
             Cell::number(row.method as f64, method.title.to_owned()).hover(method.summary),
             summary_cell(&row.ensemble, is_steps),
         ];
-        cells.push(paper_cell(method.paper.as_ref().map(|paper| paper.ensemble), palette));
-        cells.push(paper_cell(method.paper.as_ref().map(|paper| paper.clone), palette));
+        cells.push(paper_cell(paper.map(|paper| paper.ensemble), palette));
+        cells.push(paper_cell(paper.map(|paper| paper.clone), palette));
         for (clone, within) in row.clones.iter().zip(&within.clones) {
             cells.push(match (clone, within) {
                 (Some(clone), _) => {
