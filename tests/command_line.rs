@@ -117,7 +117,10 @@ fn bad_flags_get_one_sentence() {
     assert!(complaint(&["train", "--alpha", "5"]).contains("--alpha 5: must be none, or a return from -10000"));
     assert!(complaint(&["train", "--adversary-reward", "9;9"]).contains("must be none, or rewards as 9,9=-1"));
     let outside = complaint(&["train", "--adversary-reward", "10,0=1"]);
-    assert!(outside.contains("adversary_reward 10,0: must be a cell of the grid of 10 × 10 cells where a step begins"), "{outside}");
+    assert!(
+        outside.contains("adversary_reward 10,0: must be a cell of the grid of 10 × 10 cells where a step begins"),
+        "{outside}"
+    );
     let memory = complaint(&["train", "--algorithm", "exact", "--observer", "history"]);
     assert!(memory.contains("observer history: must be uniform or occupancy with the algorithm exact"), "{memory}");
     let reward = complaint(&["train", "--adversary-reward", "stay=1", "--observer", "gru"]);

@@ -21,7 +21,7 @@ usage: cargo xtask COMMAND
   serve [--port N]   install what is missing, build the page, serve it on 127.0.0.1
   build              the same page made small for publishing, in dist/
   test [STEP ...]    install what tests need, run everything (or the named steps), sum up
-  results            make docs/RESULTS.md and its pictures anew (under 2 minutes on two cores)
+  results            make docs/RESULTS.md and its pictures anew (2 to 3 minutes on two cores)
   tools              only install what the other commands need
 ";
 
@@ -121,7 +121,7 @@ fn build_page() -> Result<(), Failure> {
 }
 
 fn results() -> Result<(), Failure> {
-    steps::say("making every table and picture of docs/RESULTS.md (under 2 minutes on two cores)");
+    steps::say("making every table and picture of docs/RESULTS.md (2 to 3 minutes on two cores)");
     let ape = ["run", "--release", "--no-default-features", "--features", "cli", "--bin", "ape"];
     run("cargo", &[&ape[..], &["--", "results", "docs"]].concat())
 }
