@@ -63,6 +63,8 @@ fn evaluate_takes_the_files_horizon_and_leaves_strange_fields_alone() {
     strange["seed"] = json!(5);
     std::fs::write(path, strange.to_string()).unwrap();
     assert_eq!(evaluate()["horizon"], 100);
+    let said = String::from_utf8(ape(&["evaluate", path]).stderr).unwrap();
+    assert!(said.contains("its config is not ours and left out, T is 100 (unknown field `lambda`"), "{said}");
 }
 
 #[test]

@@ -128,6 +128,19 @@ impl Trainer {
         hash.finish()
     }
 
+    /// Makes the updates that are left of a run. `progress` hears what share is done and says whether to go on; the
+    /// result is whether all were made.
+    pub fn finish(&mut self, progress: &mut dyn FnMut(f64) -> bool) -> bool {
+        let all = self.config().updates();
+        while self.updates() < all {
+            if self.updates().is_multiple_of(64) && !progress(f64::from(self.updates()) / f64::from(all)) {
+                return false;
+            }
+            self.update();
+        }
+        true
+    }
+
     /// One update of the experts; with `alpha`, one of β after it.
     pub fn update(&mut self) {
         /// Share of a run after which β begins to follow: the constraint means nothing to experts who are still

@@ -111,6 +111,9 @@ pub struct EnsembleFile {
     // Written as null where there is none: messages (postcard) cannot leave a field out.
     #[serde(default)]
     pub config: Option<Config>,
+    /// Why the `config` that the file has was left out.
+    #[serde(skip)]
+    pub left_out: Option<String>,
 }
 
 /// Why a file holds no ensemble.
@@ -144,6 +147,7 @@ impl EnsembleFile {
             grid: grid.spec().clone(),
             experts: ensemble.policies().iter().map(|policy| policy.rows().to_vec()).collect(),
             config,
+            left_out: None,
         }
     }
 
@@ -160,8 +164,16 @@ impl EnsembleFile {
         let mut value: serde_json::Value = serde_json::from_str(text).map_err(json)?;
         let config = value.as_object_mut().and_then(|fields| fields.remove("config"));
         let file: EnsembleFile = serde_json::from_value(value).map_err(json)?;
-        let config = config.and_then(|config| serde_json::from_value(config).ok());
-        Ok(EnsembleFile { config: config.filter(|config: &Config| config.check().is_ok()), ..file })
+        let config = match config {
+            None | Some(serde_json::Value::Null) => return Ok(file),
+            Some(config) => serde_json::from_value(config).map_err(|error| error.to_string()),
+        };
+        let config =
+            config.and_then(|config: Config| config.check().map(|()| config).map_err(|error| error.to_string()));
+        Ok(match config {
+            Ok(config) => EnsembleFile { config: Some(config), ..file },
+            Err(reason) => EnsembleFile { left_out: Some(reason), ..file },
+        })
     }
 
     /// The grid and the ensemble, when everything about them is valid.

@@ -94,15 +94,8 @@ fn train(case: &Case, algorithm: AlgorithmKind, progress: &mut Progress) -> Resu
         _ => case.config.observer,
     };
     let config = Config { algorithm, observer, ..case.config.clone() };
-    let updates = config.updates();
     let mut trainer = Trainer::new(case.grid.clone(), config)?;
-    for update in 0..updates {
-        trainer.update();
-        if update.is_multiple_of(64) && !progress(f64::from(update) / f64::from(updates)) {
-            return Ok(None);
-        }
-    }
-    Ok(Some(trainer.ensemble()))
+    Ok(trainer.finish(progress).then(|| trainer.ensemble()))
 }
 
 /// A run with β = 0, stopped where `figure` of the ensemble's and the clone's capped returns comes closest to what

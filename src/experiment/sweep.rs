@@ -27,11 +27,8 @@ impl SweepRun {
         let grid = Grid::new(setup.grid.clone()).map_err(|error| error.to_string())?;
         let config = setup.config.clone();
         let mut trainer = Trainer::new(grid.clone(), config.clone()).map_err(|error| error.to_string())?;
-        for update in 0..config.updates() {
-            trainer.update();
-            if update.is_multiple_of(64) && !progress(f64::from(update) / f64::from(config.updates())) {
-                return Ok(None);
-            }
+        if !trainer.finish(progress) {
+            return Ok(None);
         }
         let ensemble = trainer.ensemble();
         let target = Target { grid: &grid, ensemble: &ensemble, horizon: config.horizon, seed: config.seed };

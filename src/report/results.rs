@@ -115,9 +115,8 @@ fn grid() -> Grid {
 
 /// A whole run.
 fn train(config: Config) -> Result<Trainer, String> {
-    let updates = config.updates();
     let mut trainer = Trainer::new(grid(), config).map_err(|error| error.to_string())?;
-    (0..updates).for_each(|_| trainer.update());
+    trainer.finish(&mut |_| true);
     Ok(trainer)
 }
 

@@ -235,6 +235,8 @@ impl App {
         match checked {
             Err(sentence) => self.notice = Some(format!("{name}: {sentence}.")),
             Ok(file) => {
+                let left_out =
+                    file.left_out.as_ref().map(|why| format!("{name}: its config is not ours and left out ({why})."));
                 self.setup.grid = file.grid.clone();
                 self.setup.config = file.config.clone().unwrap_or_default();
                 self.setup.ensemble = Some(file);
@@ -242,6 +244,7 @@ impl App {
                 self.show_clones_of(self.setup.config.observer);
                 self.opened = Some(name);
                 self.load();
+                self.notice = left_out;
             }
         }
     }

@@ -147,6 +147,9 @@ fn ensemble_file(matches: &ArgMatches) -> Result<(Grid, Ensemble, u32), String> 
     let in_file = |error| format!("{file}: {error}");
     let parsed = EnsembleFile::parse(&read(file)?).map_err(|error| in_file(error.to_string()))?;
     let horizon = parsed.config.as_ref().map_or(HORIZON, |config| config.horizon);
+    if let Some(reason) = &parsed.left_out {
+        eprintln!("ape: {file}: its config is not ours and left out, T is {HORIZON} ({reason})");
+    }
     let (grid, ensemble) = parsed.check().map_err(|error| in_file(error.to_string()))?;
     Ok((grid, ensemble, horizon))
 }
