@@ -1,8 +1,7 @@
 //! `uniform`, `occupancy`, `replay(k)`: the clones of the observer models, as with infinitely many pairs.
 
 use super::{Attacker, Cloned, Progress, Target};
-use crate::ape::Parameter;
-use crate::ape::observer::ObserverChoice;
+use crate::ape::observer::{KEPT, ObserverChoice};
 
 pub const UNIFORM: Attacker = Attacker {
     name: "uniform",
@@ -30,7 +29,7 @@ pub const REPLAY: Attacker = Attacker {
     name: "replay",
     title: "remembers recent demonstrations",
     summary: "π_o(a|s) with p(c|s) from the last contexts that ensemble episodes left at s (60 in the paper's appendix).",
-    parameter: Some(Parameter { meaning: "contexts kept at each cell", default: 60, low: 1, high: 1000 }),
+    parameter: Some(KEPT),
     usual: &[60],
     is_quick: true,
     remembers: false,

@@ -156,3 +156,33 @@ impl AttackerChoice {
         (self.model().clone)(target, self.parameter(), progress)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Every observer model has its cloner, over the whole range of its number.
+    #[test]
+    fn observers_are_cloners() {
+        for observer in ObserverChoice::all() {
+            for number in [0, u32::MAX] {
+                let observer = observer.with_parameter(number);
+                assert_eq!(AttackerChoice::of(observer).to_string(), observer.to_string());
+            }
+        }
+    }
+
+    #[test]
+    fn names_read_back_as_they_are_written() {
+        for cloner in AttackerChoice::usual() {
+            assert_eq!(cloner.to_string().parse(), Ok(cloner));
+        }
+        assert!(
+            "bc(0)"
+                .parse::<AttackerChoice>()
+                .unwrap_err()
+                .to_string()
+                .starts_with("attacker \"bc(0)\": must be one of")
+        );
+    }
+}

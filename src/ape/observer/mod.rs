@@ -14,6 +14,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 
 pub use gru::UNITS;
 pub use history::Posterior;
+pub use replay::KEPT;
 
 use super::choice::{Choice, Model, Parameter};
 use super::demonstrate::{Demonstrator, Episode};

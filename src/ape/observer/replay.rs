@@ -10,11 +10,13 @@ pub const MODEL: ObserverModel = ObserverModel {
     title: "remembers recent demonstrations",
     summary: "p(c|s) = share of c among the last contexts that ensemble episodes left at s (60 in the paper's \
               appendix); 1/n where there are none yet.",
-    parameter: Some(Parameter { meaning: "contexts kept at each cell", default: 60, low: 1, high: 1000 }),
+    parameter: Some(KEPT),
     learns: true,
     remembers: false,
     build: |grid, experts, kept| Box::new(Replay::new(grid.cells(), experts, kept as usize)),
 };
+
+pub const KEPT: Parameter = Parameter { meaning: "contexts kept at each cell", default: 60, low: 1, high: 1000 };
 
 struct Replay {
     experts: usize,
