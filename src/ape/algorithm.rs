@@ -158,7 +158,7 @@ impl Trainer {
     }
 }
 
-/// Dual ascent for Eq. 2, min E[clone] subject to E[ensemble] ≥ α. With the multiplier 1/β on the constraint
+/// Dual ascent for Eq. 2: the least return of the clone while that of the ensemble is at least α. With the multiplier 1/β on the constraint
 /// the objective is Eq. 3 up to a factor; where the ensemble is better than it must be β may grow, where it is
 /// worse β must shrink. The step is taken on log β, in units of |α|, so that β stays positive; a long one is cut, so
 /// that the experts can follow.

@@ -2,7 +2,7 @@
 //!
 //! A cloner is one file here and one line in [`ATTACKERS`]; the page's menus, the command line, the tables and
 //! the tests read that table. Most end in a stationary policy, whose four returns are exact. Some remember
-//! their episode ([`Memory`]); what they return within T steps is exact where it can be and otherwise
+//! their episode ([`crate::ape::observer::Memory`]); what they return within T steps is exact where it can be and otherwise
 //! simulated, with a confidence interval.
 
 mod bc;
