@@ -310,9 +310,8 @@ impl App {
             }
         }
         for (id, event) in self.pool.receive() {
-            self.bench.hear(id, &event, self.now);
-            self.table1.hear(id, &event, self.now);
-            self.sweep.hear(id, &event, self.now);
+            let batches = [&mut self.bench.batch, &mut self.table1.batch, &mut self.sweep.batch];
+            batches.into_iter().flatten().for_each(|batch| batch.hear(id, &event, self.now));
             self.take_clone(id, event);
         }
         while let Some((name, text)) = self.host.opened() {

@@ -19,8 +19,8 @@ const PARAGRAPHS: [(&str, &str); 5] = [
     (
         "What you see",
         "Colour is the expected number of steps from a cell to the flag, cut at 100; arrows are the probability of each \
-         move, a dot that of staying. All figures are exact. Only training \
-         plays episodes, and an observer who has to watch some.",
+         move, a dot that of staying. All figures are exact, but for \
+         those of a learned memory, which are simulated and say so. Only training plays episodes, and who has to learn from some.",
     ),
     (
         "What to try",

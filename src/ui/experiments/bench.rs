@@ -6,7 +6,7 @@ use super::{Batch, choose_cloners, exports, introduce};
 use crate::ape::EnsembleFile;
 use crate::attack::AttackerChoice;
 use crate::experiment::{Attack, Bench, Outcome, Task, ensemble_returns};
-use crate::lab::{Exported, TaskEvent, TaskId};
+use crate::lab::Exported;
 use crate::mdp::{RETURN_KINDS, Returns};
 use crate::ui::app::{App, Wanted};
 use crate::ui::chart::{self, Axes, Curve, Style};
@@ -20,7 +20,7 @@ pub struct BenchTab {
     /// Whether behaviour cloning is also tried with less data.
     has_learning_curve: bool,
     subject: Option<Subject>,
-    batch: Option<Batch>,
+    pub batch: Option<Batch>,
 }
 
 /// What was attacked.
@@ -41,12 +41,6 @@ impl Default for BenchTab {
 const PAIRS: [u32; 5] = [100, 1000, 10_000, 100_000, 1_000_000];
 
 impl BenchTab {
-    pub fn hear(&mut self, id: TaskId, event: &TaskEvent, now: f64) {
-        if let Some(batch) = &mut self.batch {
-            batch.hear(id, event, now);
-        }
-    }
-
     /// The ensemble has come that was asked for.
     pub fn attack(&mut self, exported: Exported, app: &mut App, now: f64) {
         let Ok((grid, ensemble)) = exported.file.clone().check() else { return };

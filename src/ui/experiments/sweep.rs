@@ -4,7 +4,6 @@ use egui::{DragValue, RichText, TextEdit, Ui, vec2};
 
 use super::{Batch, exports, introduce, paper_cell, summary_cell};
 use crate::experiment::{Outcome, Setup, Summary, Sweep, SweepPoint, Task};
-use crate::lab::{TaskEvent, TaskId};
 use crate::mdp::RETURN_KINDS;
 use crate::ui::app::App;
 use crate::ui::chart::{self, Axes, Curve, Style};
@@ -18,7 +17,7 @@ pub struct SweepTab {
     betas: String,
     seeds: u32,
     is_pareto: bool,
-    batch: Option<Batch>,
+    pub batch: Option<Batch>,
     refusal: Option<String>,
     /// Whether the paper's figures are of the same setting.
     is_papers: bool,
@@ -38,12 +37,6 @@ impl Default for SweepTab {
 }
 
 impl SweepTab {
-    pub fn hear(&mut self, id: TaskId, event: &TaskEvent, now: f64) {
-        if let Some(batch) = &mut self.batch {
-            batch.hear(id, event, now);
-        }
-    }
-
     pub fn show(&mut self, ui: &mut Ui, app: &mut App) {
         introduce(
             ui,

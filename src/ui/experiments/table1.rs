@@ -5,7 +5,6 @@ use egui::{DragValue, RichText, Ui};
 use super::{Batch, choose_cloners, exports, introduce, paper_cell, summary_cell};
 use crate::attack::AttackerChoice;
 use crate::experiment::{METHODS, Outcome, Setup, Table1, Task};
-use crate::lab::{TaskEvent, TaskId};
 use crate::mdp::RETURN_KINDS;
 use crate::ui::app::App;
 use crate::ui::table::{Cell, Column, table};
@@ -17,7 +16,7 @@ pub struct Table1Tab {
     seeds: u32,
     /// The cloners of the batch.
     columns: Vec<AttackerChoice>,
-    batch: Option<Batch>,
+    pub batch: Option<Batch>,
     /// Whether the paper's figures are of the same setting.
     is_papers: bool,
 }
@@ -29,12 +28,6 @@ impl Default for Table1Tab {
 }
 
 impl Table1Tab {
-    pub fn hear(&mut self, id: TaskId, event: &TaskEvent, now: f64) {
-        if let Some(batch) = &mut self.batch {
-            batch.hear(id, event, now);
-        }
-    }
-
     pub fn show(&mut self, ui: &mut Ui, app: &mut App) {
         introduce(
             ui,
