@@ -5,7 +5,7 @@ use std::cell::Cell;
 
 use ape_lab::ape::{Config, Trainer};
 use ape_lab::attack::AttackerChoice;
-use ape_lab::experiment::{Preset, Setup, Sweep, Task};
+use ape_lab::experiment::{Course, Preset, Setup, Sweep, Task};
 use ape_lab::lab::{
     Command, Event, Exported, Link, PROTOCOL, Pace, RunState, Session, Snapshot, Started, TaskEvent, ThreadLink,
     decode, encode, thread_pool,
@@ -378,5 +378,88 @@ fn a_thread_runs_a_session() {
         };
         assert_eq!(last.digest, digest_after(short(), 20));
         link.restart();
+    }
+}
+
+/// Any update can be gone back to, and what is played from there is what was played before.
+#[test]
+fn every_update_can_be_sought() {
+    let mut desk = Desk::new();
+    desk.load(short(), true);
+    desk.run(1e6);
+    let (run, end) = (desk.last().run, desk.last().digest);
+    for update in [7, 0, 19, 20, 1] {
+        // Of two that are sought at once the last counts.
+        desk.send(Command::Seek { run, update: 3 });
+        desk.send(Command::Seek { run, update });
+        desk.run(1e6);
+        let last = desk.last();
+        assert_eq!((last.update, last.recorded, last.digest), (update, 20, digest_after(short(), update)));
+        assert_eq!(last.state, if update == 20 { RunState::Finished } else { RunState::Paused });
+    }
+    let points: usize = desk.snapshots.iter().map(|snapshot| snapshot.curve.len()).sum();
+    desk.send(Command::Play);
+    desk.run(1e6);
+    assert_eq!((desk.last().update, desk.last().digest, desk.last().run), (20, end, run));
+    // Nothing of it is new to the curve.
+    assert_eq!(desk.snapshots.iter().map(|snapshot| snapshot.curve.len()).sum::<usize>(), points);
+    // Of another run nothing is shown.
+    desk.send(Command::Seek { run: run + 1, update: 2 });
+    desk.run(1e6);
+    assert_eq!(desk.last().update, 20);
+}
+
+/// Another β from a moment that lies back is another run with the same past; what is written of its course makes it again.
+#[test]
+fn a_branch_goes_on_from_the_past_and_can_be_made_again() {
+    let mut desk = Desk::new();
+    desk.load(short(), true);
+    desk.run(1e6);
+    let first = desk.last().run;
+    desk.send(Command::Seek { run: first, update: 12 });
+    desk.run(1e6);
+    desk.send(Command::Continue { beta: 0.1 });
+    desk.run(1e6);
+    let branch = desk.started.last().unwrap().clone();
+    assert_eq!(branch.branch_of, Some((first, 12)));
+    let last = desk.last().clone();
+    assert_eq!((last.run, last.update, last.beta), (branch.run, 22, 0.1));
+    assert_eq!(last.course.turns, [(12, 0.1)]);
+    assert_eq!(last.course.updates, Some(22));
+    // By hand.
+    let mut trainer = Trainer::new(Grid::new(GridSpec::default()).unwrap(), short()).unwrap();
+    (0..12).for_each(|_| trainer.update());
+    trainer.set_beta(0.1).unwrap();
+    (12..22).for_each(|_| trainer.update());
+    assert_eq!(last.digest, trainer.digest());
+    // From what is written.
+    let setup = Setup { config: short(), course: last.course.clone(), ..Setup::default() };
+    let mut again = Desk::new();
+    again.send(Command::Load { setup: Box::new(setup), play: true });
+    again.run(1e6);
+    assert_eq!((again.last().digest, again.last().update, again.last().beta), (last.digest, 22, 0.1));
+    assert_eq!(again.last().course, last.course);
+    // Its past is that of the first run, its future its own.
+    desk.send(Command::Seek { run: last.run, update: 11 });
+    desk.run(1e6);
+    assert_eq!((desk.last().digest, desk.last().beta), (digest_after(short(), 11), 0.6));
+    // At the end it is no branch to go on.
+    desk.send(Command::Seek { run: last.run, update: 22 });
+    desk.send(Command::Continue { beta: 0.3 });
+    desk.run(1e6);
+    assert_eq!((desk.last().run, desk.last().update), (last.run, 42));
+    assert_eq!(desk.last().course.turns, [(12, 0.1), (22, 0.3)]);
+}
+
+#[test]
+fn a_course_that_is_none_is_refused() {
+    for course in [
+        Course { turns: vec![(3, 0.1), (3, 0.2)], updates: None },
+        Course { turns: vec![(3, 7.0)], updates: None },
+        Course { turns: vec![], updates: Some(0) },
+    ] {
+        let mut desk = Desk::new();
+        desk.send(Command::Load { setup: Box::new(Setup { course, ..Setup::default() }), play: true });
+        assert_eq!((desk.refused.len(), desk.started.len()), (1, 0));
     }
 }

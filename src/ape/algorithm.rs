@@ -10,6 +10,7 @@ use super::{AlgorithmKind, Config, ConfigError, Contexts, Ensemble};
 use crate::mdp::{ACTIONS, Grid, Policy};
 
 /// What every algorithm holds: the experts, where and how they train.
+#[derive(Clone)]
 pub struct Experts {
     pub grid: Grid,
     pub config: Config,
@@ -59,11 +60,24 @@ pub trait Algorithm: Send {
         &[]
     }
 
+    /// About how many bytes a copy takes.
+    fn bytes(&self) -> usize;
+
+    /// A copy that goes on by itself.
+    fn boxed(&self) -> Box<dyn Algorithm>;
+
     /// One update; returns the ensemble's return within T before it, mean over starts, as it was seen.
     fn update(&mut self) -> f64;
 }
 
-/// A training run.
+impl Clone for Box<dyn Algorithm> {
+    fn clone(&self) -> Self {
+        self.boxed()
+    }
+}
+
+/// A training run. A copy of it goes on exactly as it would have.
+#[derive(Clone)]
 pub struct Trainer {
     algorithm: Box<dyn Algorithm>,
 }
@@ -117,6 +131,11 @@ impl Trainer {
     /// What the run's observer makes of the clone's own episode, where it has a memory.
     pub fn memory(&self) -> Option<Box<dyn Memory>> {
         self.algorithm.memory()
+    }
+
+    /// About how many bytes a copy takes.
+    pub fn bytes(&self) -> usize {
+        self.algorithm.bytes()
     }
 
     /// A number that two runs share only when all their parameters agree to the last bit.

@@ -15,7 +15,7 @@ pub struct Demonstrator<'g> {
 }
 
 /// One episode; its buffers are used again for the next.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub struct Episode {
     /// The cells it went through, the goal left out.
     pub states: Vec<u32>,

@@ -135,6 +135,15 @@ impl Algorithm for ExactApe {
         &self.experts
     }
 
+    fn bytes(&self) -> usize {
+        3 * 8 * self.experts.logits.len() + 40 * self.clone_reward.len()
+    }
+
+    fn boxed(&self) -> Box<dyn Algorithm> {
+        let (experts, clone_reward) = (self.experts.clone(), self.clone_reward.clone());
+        Box::new(ExactApe { dynamics: Dynamics::new(&experts.grid, experts.config.horizon), experts, clone_reward })
+    }
+
     fn experts_mut(&mut self) -> &mut Experts {
         &mut self.experts
     }
@@ -163,7 +172,7 @@ impl Algorithm for ExactApe {
 /// T steps of a policy, forwards and backwards; keeps its tables between calls.
 struct Dynamics {
     horizon: usize,
-    /// What is to come with k steps left, `[T][S]`, k = 0…T − 1.
+    /// What is to come with k steps left, `[T][S]`, k = 0…T − 1; empty until it is needed.
     ahead: Vec<f64>,
     /// Probability of being at a cell now, and a step later, `[S]`.
     now: Vec<f64>,
@@ -176,7 +185,7 @@ impl Dynamics {
     fn new(grid: &Grid, horizon: u32) -> Dynamics {
         let (cells, horizon) = (grid.cells(), horizon as usize);
         let zeros = || vec![0.0; cells];
-        Dynamics { horizon, ahead: vec![0.0; cells * horizon], now: zeros(), next: zeros(), visits: zeros() }
+        Dynamics { horizon, ahead: Vec::new(), now: zeros(), next: zeros(), visits: zeros() }
     }
 
     /// Expected return of T steps of `policy` for a reward r(s, a), mean over starts; adds `scale` times its
@@ -191,6 +200,7 @@ impl Dynamics {
     ) -> f64 {
         let cells = grid.cells();
         let executed: Vec<_> = grid.starts().iter().map(|&s| grid.executed(policy.row(s as usize))).collect();
+        self.ahead.resize(cells * self.horizon, 0.0);
         let expected = |state: usize| -> f64 { (0..ACTIONS).map(|a| policy.row(state)[a] * reward[state][a]).sum() };
         let immediate: Vec<f64> = grid.starts().iter().map(|&s| expected(s as usize)).collect();
         // Backwards: what is to come.

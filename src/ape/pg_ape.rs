@@ -19,6 +19,7 @@ use super::{BaselineKind, Config, Contexts, Ensemble, GradientKind, ReturnToGo};
 use crate::mdp::{ACTIONS, Grid, Starts};
 
 /// A batch of episodes as far as learning needs it, per (context, state, action).
+#[derive(Clone)]
 struct Tally {
     /// `[n][S][5]`: how often the action was taken.
     count: Vec<u32>,
@@ -67,6 +68,7 @@ pub struct Gradient {
 }
 
 /// A training run: the experts, their baselines, and all that an update needs.
+#[derive(Clone)]
 pub struct PgApe {
     experts: Experts,
     rng: Xoshiro256PlusPlus,
@@ -307,6 +309,15 @@ impl Algorithm for PgApe {
 
     fn values(&self) -> &[f64] {
         &self.values
+    }
+
+    fn bytes(&self) -> usize {
+        // Numbers with two moments of Adam each, and two tallies.
+        3 * 8 * (self.experts.logits.len() + self.values.len()) + 2 * 12 * self.experts.logits.len() + self.observer.bytes()
+    }
+
+    fn boxed(&self) -> Box<dyn Algorithm> {
+        Box::new(self.clone())
     }
 
     /// One iteration of Algorithm 1.

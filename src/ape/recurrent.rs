@@ -55,7 +55,7 @@ pub struct Network {
 }
 
 /// What an episode's way forward keeps for the way back; its buffers are used again for the next.
-#[derive(Default)]
+#[derive(Clone, Default)]
 struct Trace {
     /// `[T + 1][H]`: the GRU's output, from before the first cell.
     hidden: Vec<f64>,
@@ -68,6 +68,11 @@ struct Trace {
 impl Network {
     /// Most units the GRU may have.
     pub const MAX_UNITS: usize = 64;
+
+    /// Number of weights.
+    pub fn parameters(&self) -> usize {
+        self.parameters.len()
+    }
 
     /// Small random weights for S `cells`, n `contexts` and H `units`, 1..=[`Network::MAX_UNITS`].
     pub fn new(cells: usize, contexts: usize, units: usize, rng: &mut Xoshiro256PlusPlus) -> Network {
@@ -245,6 +250,7 @@ impl Memory for Network {
 }
 
 /// A network's optimiser, from one minibatch to the next.
+#[derive(Clone)]
 pub struct Learner {
     adam: Adam,
     gradient: Vec<f64>,

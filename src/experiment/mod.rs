@@ -15,7 +15,7 @@ pub use baselines::{METHODS, Method, PaperRow};
 pub use bench::{Attack, Bench, ensemble_returns};
 pub use curve::{CurvePoint, Denied};
 pub use presets::{PRESETS, Preset};
-pub use setup::{Setup, SetupError};
+pub use setup::{Course, Setup, SetupError};
 pub use statistics::Summary;
 pub use sweep::{Sweep, SweepPoint, SweepRun};
 pub use table1::{MethodRun, Row, Table1};

@@ -5,11 +5,34 @@ use serde::{Deserialize, Serialize};
 use crate::ape::{Config, ConfigError, EnsembleFile};
 use crate::mdp::{Grid, GridError, GridSpec, HORIZON};
 
+/// What changed on the way of a run: together with grid and configuration it gives the same run again.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Course {
+    /// (u, β): from the moment after u updates on, β is this. Ascending in u.
+    pub turns: Vec<(u32, f64)>,
+    /// Updates in all, where they are not as many as the configuration says.
+    pub updates: Option<u32>,
+}
+
+impl Course {
+    /// From the moment after `update` updates on β is `beta`; what was to come later is forgotten.
+    pub fn turn(&mut self, update: u32, beta: f64) {
+        self.turns.retain(|(earlier, _)| *earlier < update);
+        self.turns.push((update, beta));
+    }
+
+    /// β where it changes after so many updates.
+    pub fn turn_at(&self, update: u32) -> Option<f64> {
+        self.turns.iter().find(|(at, _)| *at == update).map(|(_, beta)| *beta)
+    }
+}
+
 /// A grid, a configuration, and an ensemble where one is given instead of trained.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Setup {
     pub grid: GridSpec,
     pub config: Config,
+    pub course: Course,
     /// An ensemble to look at; nothing is trained then.
     pub ensemble: Option<EnsembleFile>,
 }
@@ -21,11 +44,34 @@ pub enum SetupError {
     Json(String),
     #[error("grid: {0}")]
     Grid(#[from] GridError),
+    #[error("course: expected turns of β in the order of their updates, and 1 to 10,000,000 updates in all")]
+    Course,
     #[error("config: {0}")]
     Config(#[from] ConfigError),
 }
 
 impl Setup {
+    /// Updates of the whole run.
+    pub fn updates(&self) -> u32 {
+        self.course.updates.unwrap_or(self.config.updates())
+    }
+
+    /// Checks what is to change on the way.
+    pub fn check_course(&self) -> Result<(), SetupError> {
+        const MOST_UPDATES: u32 = 10_000_000;
+        let Course { turns, updates } = &self.course;
+        let is_ascending = turns.is_sorted_by(|(a, _), (b, _)| a < b);
+        if !is_ascending || updates.is_some_and(|updates| !(1..=MOST_UPDATES).contains(&updates)) {
+            return Err(SetupError::Course);
+        }
+        turns.iter().try_for_each(|&(_, beta)| Ok(Config { beta, ..self.config.clone() }.check()?))
+    }
+
+    /// β at the end of the run.
+    pub fn last_beta(&self) -> f64 {
+        self.course.turns.last().map_or(self.config.beta, |(_, beta)| *beta)
+    }
+
     /// Whether the paper's figures are of this grid, number of experts and horizon.
     pub fn is_papers(&self) -> bool {
         let Config { experts, horizon, .. } = self.config;
@@ -50,7 +96,7 @@ impl Setup {
         };
         Grid::new(grid.clone())?;
         config.check()?;
-        Ok(Setup { grid, config, ensemble: None })
+        Ok(Setup { grid, config, ..Setup::default() })
     }
 }
 

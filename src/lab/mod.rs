@@ -9,6 +9,7 @@
 mod link;
 mod pool;
 mod protocol;
+mod recording;
 mod session;
 #[cfg(not(target_arch = "wasm32"))]
 mod thread;

@@ -6,12 +6,12 @@ use serde::{Deserialize, Serialize};
 
 use crate::ape::EnsembleFile;
 use crate::attack::{AttackerChoice, Cloned};
-use crate::experiment::{CurvePoint, Outcome, Setup};
+use crate::experiment::{Course, CurvePoint, Outcome, Setup};
 use crate::mdp::{KnownReturns, Policy, Returns};
 
 /// Version of the messages: an old cached worker must not be taken for a new one. [`Event::Ready`] stays the
 /// first variant, so that every version can read every other's.
-pub const PROTOCOL: u32 = 2;
+pub const PROTOCOL: u32 = 3;
 
 /// From the page to the session.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -26,9 +26,15 @@ pub enum Command {
     Retrain {
         beta: f64,
     },
-    /// β for the updates to come; a run that had ended goes on for as long again.
+    /// β for the updates to come; a run that had ended goes on. From a moment that lies back, a branch begins: a new
+    /// run with the same past.
     Continue {
         beta: f64,
+    },
+    /// Show the run of this number after so many updates, paused. While one is sought only the last is.
+    Seek {
+        run: u32,
+        update: u32,
     },
     Play,
     Pause,
@@ -88,6 +94,8 @@ pub struct Started {
     pub run: u32,
     pub setup: Setup,
     pub optimal: PolicyView,
+    /// Where it is a branch: the run and update it goes on from.
+    pub branch_of: Option<(u32, u32)>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -107,9 +115,12 @@ pub struct Snapshot {
     pub number: u32,
     pub run: u32,
     pub state: RunState,
-    /// Updates made, and when the run ends.
+    /// Updates made at the moment shown, when the run ends, and how many were made in all so far.
     pub update: u32,
     pub last_update: u32,
+    pub recorded: u32,
+    /// What changed on the way.
+    pub course: Course,
     /// β of the updates to come.
     pub beta: f64,
     /// Hash of all parameters: equal runs share it, on every machine.

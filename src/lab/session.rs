@@ -3,10 +3,11 @@
 //! It is driven from outside: [`Session::handle`] takes a command, [`Session::advance`] works for a few
 //! milliseconds and says when to call it again, [`Session::events`] hands out what is to be sent.
 
+use super::recording::{Recording, advance};
 use super::{CloneView, Command, Event, Exported, PolicyView, RunState, Snapshot, Started};
 use crate::ape::{Config, Ensemble, EnsembleFile, Trainer};
 use crate::attack::{AttackerChoice, Cloned, Target, own_clone};
-use crate::experiment::{CurvePoint, Setup};
+use crate::experiment::{Course, CurvePoint, Setup};
 use crate::mdp::{Grid, Policy, Returns, Solver, optimal_policy};
 
 /// Longest stretch of work between two looks at the inbox, in milliseconds.
@@ -53,6 +54,9 @@ struct Run {
     /// Nothing is shown before the end.
     is_silent: bool,
     last_update: u32,
+    optimal: PolicyView,
+    /// All of its past; nothing for a given ensemble.
+    recording: Option<Recording>,
     training_ms: f64,
     curve: Vec<CurvePoint>,
 }
@@ -66,6 +70,8 @@ pub struct Session {
     show: Vec<AttackerChoice>,
     /// A β to retrain with when the retraining under way has ended.
     next_beta: Option<f64>,
+    /// An update of the run to go to.
+    seek: Option<u32>,
     outbox: Vec<Event>,
     /// Something has changed since the last snapshot.
     is_changed: bool,
@@ -113,13 +119,19 @@ impl Session {
             }
             Command::Continue { beta } => {
                 self.begin_queued()?;
-                let run = self.training()?;
-                run.trainer_mut().set_beta(beta).map_err(|error| error.to_string())?;
-                run.setup.config.beta = beta;
-                run.go_on();
+                self.arrive();
+                self.continue_with(beta)?;
+            }
+            Command::Seek { run, update } => {
+                let is_shown = run == self.runs && self.run.as_ref().is_some_and(|run| !run.is_silent || !run.is_playing);
+                if is_shown && matches!(self.run.as_ref().map(|run| &run.subject), Some(Subject::Training(_))) {
+                    self.seek = Some(update);
+                }
+                return Ok(());
             }
             Command::Play => {
                 self.begin_queued()?;
+                self.arrive();
                 self.training()?.go_on();
             }
             Command::Pause => {
@@ -129,15 +141,17 @@ impl Session {
             }
             Command::Step => {
                 self.begin_queued()?;
+                self.arrive();
                 let run = self.training()?;
                 (run.is_playing, run.is_silent) = (false, false);
                 run.last_update = run.last_update.max(run.trainer().updates() + 1);
-                run.trainer_mut().update();
-                run.after_update();
+                run.update();
             }
             Command::Reset => {
                 self.begin_queued()?;
-                let setup = self.run.as_ref().ok_or(NOTHING)?.setup.clone();
+                let mut setup = self.run.as_ref().ok_or(NOTHING)?.setup.clone();
+                setup.config.beta = setup.last_beta();
+                setup.course = Course::default();
                 self.begin(setup, false, false)?;
             }
             Command::Speed(speed) => {
@@ -147,6 +161,7 @@ impl Session {
             }
             Command::Show(cloners) => self.show = cloners,
             Command::Export => {
+                self.arrive();
                 let run = self.run.as_ref().ok_or(NOTHING)?;
                 let exported = run.export(self.runs);
                 self.outbox.push(Event::Exported(Box::new(exported)));
@@ -179,7 +194,44 @@ impl Session {
     fn retrain(&mut self, beta: f64) -> Result<(), String> {
         let mut setup = self.training()?.setup.clone();
         setup.config.beta = beta;
+        setup.course = Course::default();
         self.begin(setup, true, true)
+    }
+
+    /// Goes to the update that was asked for.
+    fn arrive(&mut self) {
+        let (Some(update), Some(run)) = (self.seek.take(), &mut self.run) else { return };
+        if let Some(recording) = &run.recording {
+            let trainer = recording.at(update, &run.setup.course);
+            run.subject = Subject::Training(Box::new(trainer));
+            (run.is_playing, run.is_silent) = (false, false);
+            self.is_changed = true;
+        }
+    }
+
+    /// Goes on with another β: where there is a future already, on a branch beside it.
+    fn continue_with(&mut self, beta: f64) -> Result<(), String> {
+        let runs = self.runs;
+        let run = self.training()?;
+        let update = run.trainer().updates();
+        run.trainer_mut().set_beta(beta).map_err(|error| error.to_string())?;
+        run.setup.course.turn(update, beta);
+        let has_future = run.recording.as_ref().is_some_and(|recording| recording.end() > update);
+        if has_future {
+            if let Some(recording) = &mut run.recording {
+                recording.cut(update);
+            }
+            // At least half of a run is still to come.
+            run.last_update = run.last_update.max(update.saturating_add(run.setup.config.updates() / 2));
+            run.set_course_updates();
+            run.curve.clear();
+            let (optimal, setup) = (run.optimal.clone(), run.setup.clone());
+            self.runs += 1;
+            let branch_of = Some((runs, update));
+            self.outbox.push(Event::Started(Box::new(Started { run: self.runs, setup, optimal, branch_of })));
+        }
+        self.training()?.go_on();
+        Ok(())
     }
 
     /// Puts a new run in the place of the old one, if its setup is good.
@@ -195,18 +247,27 @@ impl Session {
                 Subject::Training(Box::new(trainer))
             }
         };
+        setup.check_course().map_err(|error| error.to_string())?;
         self.runs += 1;
         let grid = subject.grid();
         let optimal = optimal_policy(grid);
         let value = Solver::new(grid).evaluate(&optimal, setup.config.horizon);
+        let optimal = PolicyView::new(&optimal, &value.hitting_time, value.returns.into());
         self.outbox.push(Event::Started(Box::new(Started {
             run: self.runs,
             setup: setup.clone(),
-            optimal: PolicyView::new(&optimal, &value.hitting_time, value.returns.into()),
+            optimal: optimal.clone(),
+            branch_of: None,
         })));
-        let is_training = matches!(subject, Subject::Training(_));
+        let recording = match &subject {
+            Subject::Training(trainer) => Some(Recording::new(trainer, Recording::BUDGET)),
+            Subject::Given { .. } => None,
+        };
+        let is_training = recording.is_some();
         let mut run = Run {
-            last_update: if is_training { setup.config.updates() } else { 0 },
+            last_update: if is_training { setup.updates() } else { 0 },
+            recording,
+            optimal,
             is_playing: is_playing && is_training,
             is_silent,
             setup,
@@ -216,6 +277,7 @@ impl Session {
         };
         run.add_curve_point();
         self.run = Some(run);
+        self.seek = None;
         self.allowance = 0.0;
         self.is_changed = true;
         Ok(())
@@ -224,6 +286,7 @@ impl Session {
     /// Trains for a few milliseconds where there is something to train, and makes a snapshot where there is
     /// something new to see. `clock` counts milliseconds from any moment.
     pub fn advance(&mut self, clock: &dyn Fn() -> f64) -> Pace {
+        self.arrive();
         let now = clock();
         let mut pace = self.train(now, clock);
         if let Some(run) = &self.run {
@@ -272,9 +335,8 @@ impl Session {
                 self.allowance -= 1.0;
             }
             let begin = clock();
-            run.trainer_mut().update();
+            run.update();
             run.training_ms += clock() - begin;
-            run.after_update();
             self.is_changed = true;
         }
         match speed {
@@ -320,14 +382,26 @@ impl Run {
         if self.trainer().updates() >= self.last_update {
             self.last_update = self.trainer().updates().saturating_add(self.setup.config.updates());
         }
+        self.set_course_updates();
         (self.is_playing, self.is_silent) = (true, false);
     }
 
-    /// What follows an update: the curve, and the end of the run.
-    fn after_update(&mut self) {
-        let updates = self.trainer().updates();
+    fn set_course_updates(&mut self) {
+        self.setup.course.updates = Some(self.last_update).filter(|&last| last != self.setup.config.updates());
+    }
+
+    /// One update, and what follows it: the recording, the curve, the end of the run. Of updates that were made before only
+    /// the last follows.
+    fn update(&mut self) {
+        let Subject::Training(trainer) = &mut self.subject else { return };
+        advance(trainer, &self.setup.course);
+        let updates = trainer.updates();
         if updates >= self.last_update {
             self.is_playing = false;
+        }
+        match &mut self.recording {
+            Some(recording) if recording.end() < updates => recording.keep(trainer),
+            _ => return,
         }
         let every = self.setup.config.updates().div_ceil(CURVE_POINTS);
         if updates.is_multiple_of(every) || updates == self.last_update {
@@ -404,6 +478,8 @@ impl Run {
             state,
             update,
             last_update: self.last_update,
+            recorded: self.recording.as_ref().map_or(0, Recording::end),
+            course: self.setup.course.clone(),
             beta,
             digest,
             training_ms: self.training_ms,

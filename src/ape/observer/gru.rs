@@ -23,6 +23,7 @@ pub const MODEL: ObserverModel = ObserverModel {
 
 pub const UNITS: Parameter = Parameter { meaning: "recurrent units", default: 4, low: 1, high: 32 };
 
+#[derive(Clone)]
 struct Recurrent {
     network: Network,
     learner: Learner,
@@ -43,6 +44,15 @@ impl Recurrent {
 }
 
 impl Observer for Recurrent {
+    fn boxed(&self) -> Box<dyn Observer> {
+        Box::new(self.clone())
+    }
+
+    fn bytes(&self) -> usize {
+        // The network, and two moments of Adam for each of its numbers.
+        3 * 8 * self.network.parameters()
+    }
+
     fn saw(&mut self, context: usize, states: &[u32]) {
         self.seen.push(Labelled { context: context as u8, states: states.to_vec() });
     }

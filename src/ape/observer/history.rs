@@ -18,6 +18,10 @@ pub const MODEL: ObserverModel = ObserverModel {
 struct History;
 
 impl Observer for History {
+    fn boxed(&self) -> Box<dyn Observer> {
+        Box::new(History)
+    }
+
     /// Before the first action every expert is as likely as the others.
     fn contexts(&mut self, grid: &Grid, ensemble: &Ensemble, _horizon: u32) -> Contexts {
         Contexts::equal(grid.cells(), ensemble.experts())

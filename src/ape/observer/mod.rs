@@ -23,6 +23,13 @@ use crate::mdp::Grid;
 
 /// An observer model at work on one grid and one number of experts.
 pub trait Observer: Send {
+    /// A copy with all it has seen, and about how many bytes it takes.
+    fn boxed(&self) -> Box<dyn Observer>;
+
+    fn bytes(&self) -> usize {
+        0
+    }
+
     /// An ensemble episode was played by `context`, through the cells `states`.
     fn saw(&mut self, _context: usize, _states: &[u32]) {}
 
@@ -32,6 +39,12 @@ pub trait Observer: Send {
     /// What it makes of the clone's own episode, where it has a memory.
     fn memory(&self, _ensemble: &Ensemble) -> Option<Box<dyn Memory>> {
         None
+    }
+}
+
+impl Clone for Box<dyn Observer> {
+    fn clone(&self) -> Self {
+        self.boxed()
     }
 }
 

@@ -18,6 +18,10 @@ pub const MODEL: ObserverModel = ObserverModel {
 struct OccupancyShare;
 
 impl Observer for OccupancyShare {
+    fn boxed(&self) -> Box<dyn Observer> {
+        Box::new(OccupancyShare)
+    }
+
     fn contexts(&mut self, grid: &Grid, ensemble: &Ensemble, horizon: u32) -> Contexts {
         let visits: Vec<Vec<f64>> =
             ensemble.policies().iter().map(|policy| occupancy(grid, policy, horizon).visits).collect();

@@ -18,6 +18,7 @@ pub const MODEL: ObserverModel = ObserverModel {
 
 pub const KEPT: Parameter = Parameter { meaning: "contexts kept at each cell", default: 60, low: 1, high: 1000 };
 
+#[derive(Clone)]
 struct Replay {
     experts: usize,
     kept: usize,
@@ -36,6 +37,14 @@ impl Replay {
 }
 
 impl Observer for Replay {
+    fn boxed(&self) -> Box<dyn Observer> {
+        Box::new(self.clone())
+    }
+
+    fn bytes(&self) -> usize {
+        self.rings.len() + 8 * self.seen.len() + 4 * self.counts.len()
+    }
+
     fn saw(&mut self, context: usize, states: &[u32]) {
         for &state in states {
             let state = state as usize;

@@ -17,6 +17,10 @@ pub const MODEL: ObserverModel = ObserverModel {
 struct Uniform;
 
 impl Observer for Uniform {
+    fn boxed(&self) -> Box<dyn Observer> {
+        Box::new(Uniform)
+    }
+
     fn contexts(&mut self, grid: &Grid, ensemble: &Ensemble, _horizon: u32) -> Contexts {
         Contexts::equal(grid.cells(), ensemble.experts())
     }
