@@ -313,7 +313,9 @@ impl Algorithm for PgApe {
 
     fn bytes(&self) -> usize {
         // Numbers with two moments of Adam each, and two tallies.
-        3 * 8 * (self.experts.logits.len() + self.values.len()) + 2 * 12 * self.experts.logits.len() + self.observer.bytes()
+        3 * 8 * (self.experts.logits.len() + self.values.len())
+            + 2 * 12 * self.experts.logits.len()
+            + self.observer.bytes()
     }
 
     fn boxed(&self) -> Box<dyn Algorithm> {

@@ -1,6 +1,7 @@
 //! Experiments: what a run starts from, the presets, the course of a run; the attack bench, Table 1 and the sweep
 //! over β, each a list of independent tasks.
 
+pub mod address;
 mod baselines;
 mod bench;
 mod curve;
@@ -10,6 +11,7 @@ mod statistics;
 mod sweep;
 mod table1;
 mod task;
+mod worlds;
 
 pub use baselines::{METHODS, Method, PaperRow};
 pub use bench::{Attack, Bench, ensemble_returns};
@@ -20,6 +22,7 @@ pub use statistics::Summary;
 pub use sweep::{Sweep, SweepPoint, SweepRun};
 pub use table1::{MethodRun, Row, Table1};
 pub use task::{Outcome, Task};
+pub use worlds::{WORLDS, World};
 
 /// Tells the time in milliseconds since any moment; browsers and programs have different clocks.
 pub type Clock<'a> = &'a dyn Fn() -> f64;

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::ape::{Config, ConfigError, EnsembleFile};
+use crate::ape::{Config, ConfigError, EnsembleError, EnsembleFile};
 use crate::mdp::{Grid, GridError, GridSpec, HORIZON};
 
 /// What changed on the way of a run: together with grid and configuration it gives the same run again.
@@ -46,6 +46,8 @@ pub enum SetupError {
     Grid(#[from] GridError),
     #[error("course: expected turns of β in the order of their updates, and 1 to 10,000,000 updates in all")]
     Course,
+    #[error("ensemble: {0}")]
+    Ensemble(#[from] EnsembleError),
     #[error("config: {0}")]
     Config(#[from] ConfigError),
 }
@@ -54,6 +56,17 @@ impl Setup {
     /// Updates of the whole run.
     pub fn updates(&self) -> u32 {
         self.course.updates.unwrap_or(self.config.updates())
+    }
+
+    /// Checks everything.
+    pub fn check(&self) -> Result<(), SetupError> {
+        let grid = match &self.ensemble {
+            Some(given) => given.clone().check()?.0,
+            None => Grid::new(self.grid.clone())?,
+        };
+        self.config.check()?;
+        self.config.check_on(&grid)?;
+        self.check_course()
     }
 
     /// Checks what is to change on the way.

@@ -123,7 +123,8 @@ impl Session {
                 self.continue_with(beta)?;
             }
             Command::Seek { run, update } => {
-                let is_shown = run == self.runs && self.run.as_ref().is_some_and(|run| !run.is_silent || !run.is_playing);
+                let is_shown =
+                    run == self.runs && self.run.as_ref().is_some_and(|run| !run.is_silent || !run.is_playing);
                 if is_shown && matches!(self.run.as_ref().map(|run| &run.subject), Some(Subject::Training(_))) {
                     self.seek = Some(update);
                 }
