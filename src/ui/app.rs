@@ -1,24 +1,24 @@
-//! The page: what it knows, what it hears from the session, and where its parts stand.
-
-use egui::{CentralPanel, Frame, Margin, RichText, ScrollArea, Ui};
+//! The page: what it knows, what it hears from the session, and what can be done with it. Where its parts stand is in page.rs.
 
 use super::board::Shown;
+use super::commands::PaletteWindow;
+use super::compare::Kept;
 use super::experiments::bench::BenchTab;
 use super::experiments::sweep::SweepTab;
 use super::experiments::table1::Table1Tab;
-use super::heatmap::{self, Pictures};
+use super::heatmap::Pictures;
 use super::host::Host;
-use super::panels::Touched;
-use super::theme::{self, GAP, NARROW, Palette, SPACE, WIDE};
-use super::widgets::choose;
-use super::{controls, focus, headline, help, toolbar};
+use super::settings::Preferences;
+use super::world::WorldTab;
+use super::{theme, toolbar};
 use crate::ape::observer::ObserverChoice;
 use crate::ape::{Config, EnsembleFile};
 use crate::attack::AttackerChoice;
-use crate::experiment::{Denied, Outcome, PRESETS, Setup, Task};
+use crate::experiment::{Course, CurvePoint, Denied, Outcome, PRESETS, Setup, Task};
 use crate::lab::{
     CloneView, Command, Event, Exported, Link, PROTOCOL, Pool, RunState, Snapshot, Started, TaskEvent, TaskId,
 };
+use crate::mdp::GridSpec;
 
 /// What moving β does.
 #[derive(Clone, Copy, PartialEq)]
@@ -30,13 +30,25 @@ pub enum BetaMode {
 }
 
 /// The parts of the page beside the controls.
-#[derive(Clone, Copy, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Tab {
+    Learn,
     Train,
+    World,
     Sweep,
     Bench,
     Table1,
 }
+
+/// Every tab: its name in an address, its label, and what it is for.
+pub static TABS: [(Tab, &str, &str, &str); 6] = [
+    (Tab::Learn, "learn", "Learn", "A lesson in ten steps, on the live page"),
+    (Tab::Train, "train", "Train", "Policies and their training, live"),
+    (Tab::World, "world", "World", "Draw walls, move the goal, and train in it"),
+    (Tab::Sweep, "sweep", "β sweep", "Whole runs for many β"),
+    (Tab::Bench, "bench", "Attack bench", "Every cloner against the ensemble that is shown"),
+    (Tab::Table1, "table1", "Table 1", "The paper's comparison, over seeds"),
+];
 
 /// What an ensemble is wanted for, once the session has sent it.
 #[derive(Clone, Copy, PartialEq)]
@@ -50,6 +62,7 @@ pub enum Wanted {
 }
 
 /// How the page looks at a run; nothing here changes the run.
+#[derive(Clone)]
 pub struct View {
     pub tab: Tab,
     /// Place in [`crate::mdp::RETURN_KINDS`] of the return that is shown.
@@ -61,13 +74,21 @@ pub struct View {
     pub speed: usize,
     /// The cell marked in every panel.
     pub cell: Option<usize>,
+    /// The update that was asked for and is not shown yet.
+    pub sought: Option<u32>,
+    /// The step of the lesson.
+    pub step: usize,
+    /// The step whose picture was put on the page last.
+    pub staged: Option<usize>,
     pub is_help_open: bool,
+    /// Whether the policies stand there as a table.
+    pub is_table_open: bool,
     /// Whether the page was last used by keyboard.
     pub is_by_keyboard: bool,
 }
 
 /// The session at the other end of the link, as far as the page knows.
-enum Session {
+pub enum Session {
     Starting,
     Ready,
     /// It is gone; the sentence says how.
@@ -76,25 +97,35 @@ enum Session {
 
 /// The page.
 pub struct App {
-    link: Box<dyn Link>,
-    session: Session,
+    pub(super) link: Box<dyn Link>,
+    pub(super) session: Session,
     /// What the controls say; the session is told of every change.
-    setup: Setup,
+    pub(super) setup: Setup,
     /// The place in [`PRESETS`] that `setup` was taken from, as long as nothing was changed since.
-    preset: Option<usize>,
+    pub(super) preset: Option<usize>,
     /// A run that has begun and shown nothing yet.
     begun: Option<Started>,
     /// What is on the page: a run, its grid, its latest snapshot and its curve so far.
-    shown: Option<Shown>,
+    pub(super) shown: Option<Shown>,
     /// A sentence from the session about something it would not do.
-    notice: Option<String>,
+    pub(super) notice: Option<String>,
     pub view: View,
-    pictures: Pictures,
+    pub preferences: Preferences,
+    /// Runs that stay on the page to compare with.
+    pub kept: Vec<Kept>,
+    pub palette: PaletteWindow,
+    pub(super) pictures: Pictures,
     pub pool: Pool,
-    host: Box<dyn Host>,
-    bench: BenchTab,
-    table1: Table1Tab,
-    sweep: SweepTab,
+    pub(super) host: Box<dyn Host>,
+    pub(super) world: WorldTab,
+    pub(super) bench: BenchTab,
+    pub(super) table1: Table1Tab,
+    pub(super) sweep: SweepTab,
+    /// The moment and digest that the address promises; then whether they came true.
+    pub(super) promise: Option<Promise>,
+    pub(super) reproduced: Option<Reproduced>,
+    /// What the address says, and when that was last looked at.
+    pub(super) address: (String, f64),
     /// What the next ensembles from the session are for.
     wanted: Vec<Wanted>,
     /// Clones being made that are not quick, and those that were, each with the run and update it is of.
@@ -103,11 +134,27 @@ pub struct App {
     /// Name of the file that the ensemble on the page was read from.
     pub opened: Option<String>,
     /// The page's clock, in seconds.
-    now: f64,
+    pub(super) now: f64,
     /// Snapshots taken in, over all sessions.
     taken: u64,
     /// A snapshot that has come and not been drawn yet.
-    undrawn: Option<u32>,
+    pub(super) undrawn: Option<u32>,
+}
+
+/// What an address says of the run it opens.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Promise {
+    /// The moment to show; none is the end.
+    pub update: Option<u32>,
+    pub digest: Option<u64>,
+}
+
+/// Whether a run has come to the digest of the address.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Reproduced {
+    pub run: u32,
+    pub update: u32,
+    pub promised: u64,
 }
 
 impl App {
@@ -129,12 +176,23 @@ impl App {
                 beta_mode: BetaMode::Retrain,
                 speed: 5,
                 cell: None,
+                sought: None,
+                step: 0,
+                staged: None,
                 is_help_open: false,
+                is_table_open: false,
                 is_by_keyboard: false,
             },
+            preferences: Preferences::default(),
+            kept: Vec::new(),
+            palette: PaletteWindow::default(),
             pictures: Pictures::default(),
             pool,
             host,
+            world: WorldTab::default(),
+            promise: None,
+            reproduced: None,
+            address: (String::new(), 0.0),
             bench: BenchTab::default(),
             table1: Table1Tab::default(),
             sweep: SweepTab::default(),
@@ -146,6 +204,7 @@ impl App {
             taken: 0,
             undrawn: None,
         };
+        app.recall_preferences(ctx);
         app.load_preset(0);
         app
     }
@@ -166,7 +225,8 @@ impl App {
 
     /// What is collected of r̃, where the run denies the clone that.
     pub fn denied(&self) -> Option<Denied> {
-        self.shown.as_ref()?.curve.last()?.denied
+        let shown = self.shown.as_ref()?;
+        shown.curve.iter().rfind(|point| point.update <= shown.snapshot.update)?.denied
     }
 
     /// Whether a run has begun that has not shown anything yet.
@@ -187,11 +247,7 @@ impl App {
     }
 
     pub fn load_preset(&mut self, index: usize) {
-        self.setup = (PRESETS[index].setup)();
-        self.preset = Some(index);
-        self.opened = None;
-        self.show_clones_of(self.setup.config.observer);
-        self.load();
+        self.begin((PRESETS[index].setup)(), Some(index));
     }
 
     /// Trains with another configuration; a given ensemble is left for it.
@@ -199,10 +255,33 @@ impl App {
         if config.observer != self.setup.config.observer {
             self.show_clones_of(config.observer);
         }
-        self.setup.config = config;
+        self.setup.config = Config { beta: self.setup.last_beta(), ..config };
+        self.setup.course = Course::default();
         self.setup.ensemble = None;
         self.preset = None;
         self.opened = None;
+        self.load();
+    }
+
+    /// Trains in another world with the configuration that is there; one that is no good is refused with a sentence.
+    pub fn change_world(&mut self, grid: GridSpec) -> Result<(), String> {
+        let config = Config { beta: self.setup.last_beta(), ..self.setup.config.clone() };
+        let setup = Setup { grid, config, ..Setup::default() };
+        setup.check().map_err(|error| error.to_string())?;
+        self.setup = setup;
+        self.preset = None;
+        self.opened = None;
+        self.view.cell = None;
+        self.load();
+        Ok(())
+    }
+
+    /// Begins with a setup that has been checked.
+    pub fn begin(&mut self, setup: Setup, preset: Option<usize>) {
+        self.setup = setup;
+        self.preset = preset;
+        self.opened = None;
+        self.show_clones_of(self.setup.config.observer);
         self.load();
     }
 
@@ -229,8 +308,8 @@ impl App {
     }
 
     /// Shows the ensemble of a file; one that is no good is refused with a sentence.
-    fn open(&mut self, name: String, text: Result<String, String>) {
-        let file = text.and_then(|text| EnsembleFile::parse(&text).map_err(|error| error.to_string()));
+    pub(super) fn open(&mut self, name: String, text: Result<String, String>) {
+        let file = text.clone().and_then(|text| EnsembleFile::parse(&text).map_err(|error| error.to_string()));
         let checked = file.and_then(|file| file.clone().check().map(|_| file).map_err(|error| error.to_string()));
         match checked {
             Err(sentence) => self.notice = Some(format!("{name}: {sentence}.")),
@@ -239,40 +318,80 @@ impl App {
                     file.left_out.as_ref().map(|why| format!("{name}: its config is not ours and left out ({why})."));
                 self.setup.grid = file.grid.clone();
                 self.setup.config = file.config.clone().unwrap_or_default();
+                self.setup.course = Course::default();
                 self.setup.ensemble = Some(file);
                 self.preset = None;
                 self.show_clones_of(self.setup.config.observer);
-                self.opened = Some(name);
                 self.load();
-                self.notice = left_out;
+                self.notice = left_out.or(self.keep_file(&name, &text.unwrap_or_default()).err());
+                self.opened = Some(name);
             }
         }
     }
 
     pub fn set_beta(&mut self, beta: f64) {
-        if beta != self.setup.config.beta {
-            self.setup.config.beta = beta;
-            self.preset = None;
-            self.send(match self.view.beta_mode {
-                BetaMode::Retrain => Command::Retrain { beta },
-                BetaMode::Continue => Command::Continue { beta },
-            });
+        if beta == self.setup.last_beta() {
+            return;
         }
+        self.preset = None;
+        match self.view.beta_mode {
+            BetaMode::Retrain => {
+                self.setup.config.beta = beta;
+                self.setup.course = Course::default();
+                self.promise = None;
+                self.send(Command::Retrain { beta });
+            }
+            BetaMode::Continue => self.continue_with(beta),
+        }
+    }
+
+    /// The run goes on from the moment shown with this β; where that lies back, on a branch.
+    pub fn continue_with(&mut self, beta: f64) {
+        if let Some(shown) = &self.shown {
+            // The session will say the same.
+            self.setup.course.turn(shown.snapshot.update, beta);
+            self.promise = None;
+            self.view.sought = None;
+            self.send(Command::Continue { beta });
+        }
+    }
+
+    /// Shows another moment of the run.
+    pub fn seek(&mut self, update: u32) {
+        let Some(shown) = &self.shown else { return };
+        let update = update.min(shown.snapshot.recorded);
+        let run = shown.snapshot.run;
+        if shown.snapshot.state != RunState::Given && self.view.sought.unwrap_or(shown.snapshot.update) != update {
+            self.view.sought = Some(update);
+            self.send(Command::Seek { run, update });
+        }
+    }
+
+    /// The update that is shown, or about to be.
+    pub fn moment(&self) -> u32 {
+        self.view.sought.or(self.shown.as_ref().map(|shown| shown.snapshot.update)).unwrap_or(0)
     }
 
     fn load(&mut self) {
         self.notice = None;
+        self.promise = None;
+        self.reproduced = None;
+        self.view.sought = None;
         self.send(Command::Load { setup: Box::new(self.setup.clone()), play: true });
     }
 
     /// The clone that is trained against, and the honest one or the blind one beside it.
-    fn show_clones_of(&mut self, observer: ObserverChoice) {
+    pub(super) fn usual_clones(observer: ObserverChoice) -> Vec<AttackerChoice> {
         let own = AttackerChoice::of(observer);
         let beside = if own == AttackerChoice::OCCUPANCY { AttackerChoice::UNIFORM } else { AttackerChoice::OCCUPANCY };
-        self.show_clones(vec![own, beside]);
+        vec![own, beside]
     }
 
-    fn show_clones(&mut self, clones: Vec<AttackerChoice>) {
+    fn show_clones_of(&mut self, observer: ObserverChoice) {
+        self.show_clones(App::usual_clones(observer));
+    }
+
+    pub(super) fn show_clones(&mut self, clones: Vec<AttackerChoice>) {
         self.view.clones = clones;
         self.send(Command::Show(self.view.clones.clone()));
     }
@@ -316,6 +435,9 @@ impl App {
         }
         while let Some((name, text)) = self.host.opened() {
             self.open(name, text);
+        }
+        while let Some(fragment) = self.host.visited() {
+            self.visit(&fragment);
         }
     }
 
@@ -416,198 +538,51 @@ impl App {
         self.undrawn = Some(snapshot.number);
         let points = std::mem::take(&mut snapshot.curve);
         if let Some(started) = self.begun.take_if(|begun| begun.run == snapshot.run) {
-            self.shown = Shown::new(started, snapshot, points, self.taken);
+            let past = self.past_of(&started);
+            self.shown = Shown::new(started, snapshot, [past, points].concat(), self.taken);
         } else if let Some(shown) = self.shown.as_mut().filter(|shown| shown.started.run == snapshot.run) {
             shown.curve.extend(points);
             shown.snapshot = snapshot;
             shown.version = self.taken;
         }
+        self.follow();
         self.add_made_clones();
     }
-}
 
-impl eframe::App for App {
-    fn logic(&mut self, _ctx: &egui::Context, _frame: &mut eframe::Frame) {
-        self.hear();
-    }
-
-    fn ui(&mut self, ui: &mut Ui, _frame: &mut eframe::Frame) {
-        self.show(ui);
-    }
-}
-
-impl App {
-    /// Draws the page, and says what has been drawn.
-    pub fn show(&mut self, ui: &mut Ui) {
-        self.draw(ui);
-        if let Some(number) = self.undrawn.take() {
-            self.send(Command::Seen(number));
-        }
-    }
-
-    fn draw(&mut self, ui: &mut Ui) {
-        self.now = ui.input(|input| input.time);
-        for file in ui.input(|input| input.raw.dropped_files.clone()) {
-            self.host.read(file);
-        }
-        let width = ui.available_width();
-        if width < NARROW {
-            theme::enlarge_targets(ui);
-        }
-        let margin = if width < NARROW { 10 } else { SPACE as i8 };
-        let sheet = Frame::new().fill(Palette::of(ui).ground).inner_margin(Margin::symmetric(margin, 10));
-        if width < WIDE {
-            CentralPanel::no_frame().frame(sheet).show(ui, |ui| {
-                ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
-                    self.show_top(ui);
-                    self.show_tab(ui, Shown::show_stacked);
-                    ui.add_space(GAP);
-                    theme::card(ui).show(ui, |ui| {
-                        ui.set_width(ui.available_width());
-                        controls::show(ui, self);
-                    });
-                });
-            });
-        } else {
-            egui::Panel::top("top").frame(sheet).show_separator_line(false).show(ui, |ui| self.show_top(ui));
-            egui::Panel::left("controls")
-                .exact_size(272.0)
-                .resizable(false)
-                .show_separator_line(false)
-                .frame(Frame::new().fill(Palette::of(ui).ground).inner_margin(Margin {
-                    left: margin,
-                    right: 4,
-                    top: 0,
-                    bottom: 10,
-                }))
-                .show(ui, |ui| {
-                    theme::card(ui).show(ui, |ui| {
-                        ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| controls::show(ui, self));
-                    });
-                });
-            let rest = Frame::new().fill(Palette::of(ui).ground).inner_margin(Margin {
-                left: 12,
-                right: margin,
-                top: 0,
-                bottom: 10,
-            });
-            CentralPanel::no_frame().frame(rest).show(ui, |ui| self.show_tab(ui, Shown::show_planned));
-        }
-        self.show_help(ui);
-        focus::show(ui, &mut self.view.is_by_keyboard);
-    }
-
-    fn show_top(&mut self, ui: &mut Ui) {
-        ui.scope(|ui| toolbar::show(ui, self));
-        ui.add_space(2.0);
-        self.show_messages(ui);
-        headline::show_sentence(ui, self);
-        ui.add_space(4.0);
-        theme::card(ui).show(ui, |ui| {
-            ui.set_width(ui.available_width());
-            headline::show(ui, self);
-        });
-    }
-
-    /// What has gone wrong, and what can be done about it.
-    fn show_messages(&mut self, ui: &mut Ui) {
-        let palette = Palette::of(ui);
-        let message = |ui: &mut Ui, sentence: &str, button: &str| -> bool {
-            theme::card(ui)
-                .stroke(egui::Stroke::new(1.5, palette.warning))
-                .show(ui, |ui| {
-                    ui.horizontal_wrapped(|ui| {
-                        let label = ui.label(RichText::new(sentence).color(palette.warning));
-                        ui.ctx().accesskit_node_builder(label.id, |node| node.set_role(egui::Role::Alert));
-                        ui.button(button).clicked()
-                    })
-                    .inner
-                })
-                .inner
-        };
-        if let Session::Failed(sentence) = &self.session {
-            let sentence = format!("{sentence} What is on the page stays; training needs a new worker.");
-            if message(ui, &sentence, "Restart the worker") {
-                self.session = Session::Starting;
-                self.link.restart();
+    /// The curve of a branch up to where it begins; the run that it leaves is kept to compare with.
+    fn past_of(&mut self, started: &Started) -> Vec<CurvePoint> {
+        let Some((run, update)) = started.branch_of else { return Vec::new() };
+        match self.shown.take_if(|shown| shown.started.run == run) {
+            Some(shown) => {
+                let past = shown.curve.iter().filter(|point| point.update <= update).copied().collect();
+                self.keep(shown);
+                past
             }
-        }
-        if let Some(sentence) = self.notice.clone()
-            && message(ui, &sentence, "Dismiss")
-        {
-            self.notice = None;
+            None => Vec::new(),
         }
     }
 
-    /// The tabs, and the one that is open.
-    fn show_tab(&mut self, ui: &mut Ui, draw: fn(&Shown, &mut Ui, &View, &mut Pictures) -> Touched) {
-        let options = [
-            (Tab::Train, "Train", "Policies and their training, live"),
-            (Tab::Sweep, "β sweep", "Whole runs for many β"),
-            (Tab::Bench, "Attack bench", "Every cloner against the ensemble that is shown"),
-            (Tab::Table1, "Table 1", "The paper's comparison, over seeds"),
-        ];
-        let is_stacked = ui.ctx().content_rect().width() < WIDE;
-        ui.horizontal(|ui| {
-            choose(ui, "Tab", &mut self.view.tab, &options);
-            if self.view.tab == Tab::Train && !is_stacked {
-                ui.add_space(SPACE);
-                heatmap::color_bar(ui);
-            }
-        });
-        ui.add_space(2.0);
-        if self.view.tab == Tab::Train {
-            return self.show_board(ui, draw);
+    /// What follows from a new snapshot: the course of its run, and the moment that the address asks for.
+    fn follow(&mut self) {
+        let Some(Shown { snapshot, started, .. }) = &self.shown else { return };
+        // Unless the controls have gone on to another run.
+        let is_same = (&started.setup.config, &started.setup.grid) == (&self.setup.config, &self.setup.grid);
+        if self.begun.is_none() && is_same {
+            self.setup.course = snapshot.course.clone();
         }
-        theme::card(ui).show(ui, |ui| {
-            ui.set_width(ui.available_width());
-            let mut show = |ui: &mut Ui| match self.view.tab {
-                Tab::Train => {}
-                Tab::Sweep => {
-                    let mut tab = std::mem::take(&mut self.sweep);
-                    tab.show(ui, self);
-                    self.sweep = tab;
-                }
-                Tab::Bench => {
-                    let mut tab = std::mem::take(&mut self.bench);
-                    tab.show(ui, self);
-                    self.bench = tab;
-                }
-                Tab::Table1 => {
-                    let mut tab = std::mem::take(&mut self.table1);
-                    tab.show(ui, self);
-                    self.table1 = tab;
-                }
-            };
-            if is_stacked {
-                // The page itself scrolls.
-                show(ui);
+        if self.view.sought == Some(snapshot.update) {
+            self.view.sought = None;
+        }
+        let is_resting = matches!(snapshot.state, RunState::Paused | RunState::Finished) && self.begun.is_none();
+        if let Some(promise) = self.promise.filter(|_| is_resting) {
+            let update = promise.update.unwrap_or(snapshot.last_update);
+            if snapshot.update == update {
+                let run = snapshot.run;
+                self.reproduced = promise.digest.map(|promised| Reproduced { run, update, promised });
+                self.promise = None;
             } else {
-                ScrollArea::vertical().auto_shrink([false, false]).show(ui, show);
+                self.seek(update);
             }
-        });
-    }
-
-    /// The run that is shown, by `draw`; then what the visitor did to it.
-    fn show_board(&mut self, ui: &mut Ui, draw: fn(&Shown, &mut Ui, &View, &mut Pictures) -> Touched) {
-        let Some(shown) = &self.shown else {
-            if self.is_session_alive() {
-                ui.label(RichText::new("The first policies are on their way …").color(Palette::of(ui).muted));
-            }
-            return;
-        };
-        let touched = draw(shown, ui, &self.view, &mut self.pictures);
-        if touched.cell.is_some() {
-            self.view.cell = touched.cell;
-        }
-        if let Some(clones) = touched.clones {
-            self.show_clones(clones);
-        }
-    }
-
-    fn show_help(&mut self, ui: &mut Ui) {
-        if self.view.is_help_open && help::show(ui) {
-            self.view.is_help_open = false;
         }
     }
 }

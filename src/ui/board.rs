@@ -6,19 +6,21 @@ use super::app::View;
 use super::heatmap::{self, Pictures};
 use super::panels::{self, Ground, Panel, Plan, Touched};
 use super::theme::{self, GAP, NARROW};
-use super::{chart, inspector};
+use super::compare::Kept;
+use super::{chart, inspector, timeline};
 use crate::experiment::CurvePoint;
 use crate::lab::{Snapshot, Started};
 use crate::mdp::Grid;
 
 /// A run as it is shown: its grid, its latest snapshot and its curve so far.
+#[derive(Clone)]
 pub struct Shown {
     pub started: Started,
     pub snapshot: Snapshot,
     pub curve: Vec<CurvePoint>,
     /// Another one for every snapshot there ever was on the page.
     pub version: u64,
-    grid: Grid,
+    pub grid: Grid,
 }
 
 /// What a card adds to the height of its contents.
@@ -33,16 +35,14 @@ impl Shown {
     }
 
     /// Everything below one another, for narrow pages.
-    pub fn show_stacked(&self, ui: &mut Ui, view: &View, pictures: &mut Pictures) -> Touched {
+    pub fn show_stacked(&self, ui: &mut Ui, view: &View, kept: &[Kept], pictures: &mut Pictures) -> Touched {
         ui.add_space(GAP);
-        heatmap::color_bar(ui);
+        heatmap::color_bar(ui, view.color_map);
         let width = ui.available_width();
         let columns = if width < NARROW { 2 } else { 3 };
-        let picture = ((width - 2.0 * GAP * (columns - 1) as f32) / columns as f32).floor();
-        let size = vec2(picture, picture * self.grid.rows() as f32 / self.grid.cols() as f32);
-        let plan = Plan { columns, picture: size, is_rest_right: false };
+        let plan = Plan::stacked(width, columns, &self.grid);
         let panels = panels::list(&self.started, &self.snapshot, view);
-        let touched = self.show_panels(ui, &panels, &plan, view, pictures);
+        let mut touched = self.show_panels(ui, &panels, &plan, view, pictures);
         ui.add_space(GAP);
         theme::card(ui).show(ui, |ui| {
             ui.set_width(ui.available_width());
@@ -51,17 +51,17 @@ impl Shown {
         ui.add_space(GAP);
         theme::card(ui).show(ui, |ui| {
             ui.set_height(260.0);
-            self.show_chart(ui, view);
+            self.show_chart(ui, view, kept, &mut touched);
         });
         touched
     }
 
     /// Panels as large as the page allows, with chart and inspector beside or below them.
-    pub fn show_planned(&self, ui: &mut Ui, view: &View, pictures: &mut Pictures) -> Touched {
+    pub fn show_planned(&self, ui: &mut Ui, view: &View, kept: &[Kept], pictures: &mut Pictures) -> Touched {
         let panels = panels::list(&self.started, &self.snapshot, view);
         let area = ui.available_rect_before_wrap();
         let plan = Plan::new(ui, area.size(), panels.len(), &self.grid);
-        let touched = self.show_panels(ui, &panels, &plan, view, pictures);
+        let mut touched = self.show_panels(ui, &panels, &plan, view, pictures);
         let (first, second) = if plan.is_rest_right {
             let rest = area.with_min_x(area.left() + plan.width() + 2.0 * GAP);
             let height = (inspector::height(self.snapshot.experts.len()) + CARD).min(rest.height() / 2.0);
@@ -71,7 +71,7 @@ impl Shown {
             let (left, right) = ui.available_rect_before_wrap().split_left_right_at_fraction(0.5);
             (left.with_max_x(left.right() - GAP), right)
         };
-        let card = |ui: &mut Ui, place, contents: &dyn Fn(&mut Ui)| {
+        let card = |ui: &mut Ui, place, contents: &mut dyn FnMut(&mut Ui)| {
             ui.scope_builder(UiBuilder::new().max_rect(place), |ui| {
                 theme::card(ui).show(ui, |ui| {
                     ui.set_min_size(ui.available_size());
@@ -79,12 +79,12 @@ impl Shown {
                 });
             });
         };
-        card(ui, first, &|ui| self.show_chart(ui, view));
-        card(ui, second, &|ui| inspector::show(ui, &panels, &self.grid, view.cell));
+        card(ui, first, &mut |ui| self.show_chart(ui, view, kept, &mut touched));
+        card(ui, second, &mut |ui| inspector::show(ui, &panels, &self.grid, view.cell));
         touched
     }
 
-    fn show_panels(&self, ui: &mut Ui, panels: &[Panel], plan: &Plan, view: &View, pictures: &mut Pictures) -> Touched {
+    pub fn show_panels(&self, ui: &mut Ui, panels: &[Panel], plan: &Plan, view: &View, pictures: &mut Pictures) -> Touched {
         let reward = self.started.setup.config.adversary_reward.as_ref();
         let rewards: Vec<(usize, f64)> = reward.map_or(Vec::new(), |reward| {
             let of_cells = self.grid.starts().iter().map(|&s| (s as usize, reward.of_cell(self.grid.cell(s as usize))));
@@ -94,7 +94,11 @@ impl Shown {
         panels::show(ui, panels, plan, &ground, view, pictures)
     }
 
-    fn show_chart(&self, ui: &mut Ui, view: &View) {
-        chart::show(ui, &self.curve, &self.snapshot, &self.started.setup.config, view);
+    /// The chart, and below it the timeline.
+    fn show_chart(&self, ui: &mut Ui, view: &View, kept: &[Kept], touched: &mut Touched) {
+        let below = timeline::height(ui, self);
+        let size = ui.available_size() - vec2(0.0, below);
+        ui.scope(|ui| touched.update = touched.update.or(chart::show(ui, size, self, kept, view)));
+        timeline::show(ui, self, view, touched);
     }
 }

@@ -2,16 +2,17 @@
 
 use egui::{Color32, Label, Rangef, RichText, TextStyle, Ui, Vec2, vec2};
 use egui_plot::{
-    AxisHints, GridInput, HoverPosition, Line, LineStyle, Plot, PlotPoint, PlotPoints, Points, Text,
+    AxisHints, GridInput, HoverPosition, Line, LineStyle, Plot, PlotPoint, PlotPoints, Points, Text, VLine,
     uniform_grid_spacer,
 };
 
 use super::app::View;
+use super::board::Shown;
+use super::compare::Kept;
 use super::numbers;
 use super::theme::Palette;
-use crate::ape::Config;
 use crate::experiment::CurvePoint;
-use crate::lab::{RunState, Snapshot};
+use crate::lab::RunState;
 use crate::mdp::RETURN_KINDS;
 
 /// A line or a cloud of points.
@@ -25,6 +26,7 @@ pub struct Curve {
 #[derive(Clone, Copy, PartialEq)]
 pub enum Style {
     Solid,
+    Thin,
     Dashed,
     /// A line with its points marked.
     Marked,
@@ -41,10 +43,12 @@ pub struct Axes {
     pub y: fn(f64) -> String,
     /// Words at points.
     pub labels: Vec<([f64; 2], String)>,
+    /// Where a vertical line stands that can be dragged.
+    pub cursor: Option<f64>,
 }
 
-/// Draws curves over axes.
-pub fn plot(ui: &mut Ui, axes: Axes, curves: Vec<Curve>) {
+/// Draws curves over axes; returns where the cursor was dragged to.
+pub fn plot(ui: &mut Ui, axes: Axes, curves: Vec<Curve>) -> Option<f64> {
     let palette = Palette::of(ui);
     let hints = |hints: AxisHints<'static>| {
         hints.tick_label_color(palette.muted).tick_label_font(TextStyle::Small.resolve(ui.style()))
@@ -78,10 +82,11 @@ pub fn plot(ui: &mut Ui, axes: Axes, curves: Vec<Curve>) {
     for [x, y] in axes.include {
         plot = plot.include_x(x).include_y(y);
     }
-    plot.show(ui, |plot| {
+    let cursor = axes.cursor;
+    let shown = plot.show(ui, |plot| {
         for Curve { name, color, points, style } in curves {
             if style != Style::Points {
-                let line = Line::new(name.clone(), PlotPoints::from(points.clone())).color(color).width(2.0);
+                let line = Line::new(name.clone(), PlotPoints::from(points.clone())).color(color).width(if style == Style::Thin { 1.0 } else { 2.0 });
                 plot.line(if style == Style::Dashed { line.style(LineStyle::dashed_loose()) } else { line });
             }
             if matches!(style, Style::Marked | Style::Points) {
@@ -92,7 +97,12 @@ pub fn plot(ui: &mut Ui, axes: Axes, curves: Vec<Curve>) {
             let text = RichText::new(label).small().color(palette.muted);
             plot.text(Text::new("", PlotPoint::new(x, y), text).anchor(egui::Align2::LEFT_BOTTOM));
         }
+        if let Some(x) = cursor {
+            plot.vline(VLine::new("", x).color(palette.ink).width(1.5));
+        }
     });
+    let at = shown.response.interact_pointer_pos().filter(|_| cursor.is_some())?;
+    Some(shown.transform.value_from_position(at).x)
 }
 
 /// The names of curves in their colours, on one line where there is room.
@@ -109,12 +119,17 @@ pub fn legend<'a>(ui: &mut Ui, title: &str, curves: impl Iterator<Item = (&'a st
 
 /// Draws the curve of a run into all the space there is: returns of ensemble and clone and what is climbed; and
 /// β below, where it moves by itself.
-pub fn show(ui: &mut Ui, curve: &[CurvePoint], snapshot: &Snapshot, config: &Config, view: &View) {
+///
+/// Kept runs stand behind it. Returns the update that was dragged to.
+pub fn show(ui: &mut Ui, size: Vec2, shown: &Shown, kept: &[Kept], view: &View) -> Option<u32> {
+    let Shown { curve, snapshot, .. } = shown;
+    let config = &shown.started.setup.config;
     let palette = Palette::of(ui);
+    let top = ui.cursor().top();
     let kind = &RETURN_KINDS[view.kind];
     if snapshot.state == RunState::Given {
         ui.label(RichText::new("Over training: nothing, as this ensemble was given.").small().color(palette.muted));
-        return;
+        return None;
     }
     // A clone with a memory is not known by every kind of return: within T there is always one.
     let is_known = curve.iter().all(|point| point.clone.get(view.kind).is_some());
@@ -126,6 +141,18 @@ pub fn show(ui: &mut Ui, curve: &[CurvePoint], snapshot: &Snapshot, config: &Con
         style,
     };
     let clone = format!("clone ({}{})", config.observer, if is_known { "" } else { ", within T" });
+    // Behind the run shown, those that are kept: both lines of each in its colour.
+    let mut behind = Vec::new();
+    for (index, kept) in kept.iter().enumerate() {
+        let line = |name: &str, style: Style, value: &dyn Fn(&CurvePoint) -> f64| Curve {
+            name: format!("{name}, {}", kept.name),
+            color: palette.kept(index),
+            points: kept.shown.curve.iter().map(|point| [f64::from(point.update), value(point)]).collect(),
+            style,
+        };
+        behind.push(line("ensemble", Style::Thin, &|point| (kind.get)(&point.ensemble)));
+        behind.push(line("clone", Style::Thin, &of_clone));
+    }
     let mut curves = vec![
         curve_of("ensemble", palette.accent, Style::Solid, &|point| (kind.get)(&point.ensemble)),
         curve_of(&clone, palette.clone, Style::Solid, &of_clone),
@@ -144,7 +171,7 @@ pub fn show(ui: &mut Ui, curve: &[CurvePoint], snapshot: &Snapshot, config: &Con
     let title = format!("Over training, {} ({unit}):", kind.label);
     legend(ui, &title, curves.iter().map(|curve| (&*curve.name, curve.color)));
     let moves = config.alpha.is_some();
-    let size = ui.available_size();
+    let size = vec2(size.x, size.y - (ui.cursor().top() - top));
     let below = if moves { (0.3 * size.y).max(60.0) } else { 0.0 };
     let last = f64::from(snapshot.last_update);
     let x = |update: f64| numbers::decimal(update, 0);
@@ -155,8 +182,10 @@ pub fn show(ui: &mut Ui, curve: &[CurvePoint], snapshot: &Snapshot, config: &Con
         x,
         y: if kind.is_steps { in_steps } else { |value| numbers::decimal(value, 2) },
         labels: Vec::new(),
+        cursor: Some(f64::from(view.sought.unwrap_or(snapshot.update))),
     };
-    plot(ui, axes, curves);
+    let curves = behind.into_iter().chain(curves).collect();
+    let sought = plot(ui, axes, curves);
     if moves {
         let beta = curve_of("β", palette.ink, Style::Solid, &|point| point.beta);
         legend(ui, "Dual ascent:", [("β", palette.ink)].into_iter());
@@ -167,9 +196,11 @@ pub fn show(ui: &mut Ui, curve: &[CurvePoint], snapshot: &Snapshot, config: &Con
             x,
             y: |value| numbers::decimal(value, 2),
             labels: Vec::new(),
+            cursor: None,
         };
         plot(ui, axes, vec![beta]);
     }
+    sought.map(|x| x.clamp(0.0, f64::from(snapshot.recorded))).map(|x| libm::round(x) as u32)
 }
 
 /// Steps on an axis: whole as a rule, powers of ten where they are huge.

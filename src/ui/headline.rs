@@ -63,7 +63,7 @@ fn beta(ui: &mut Ui, app: &mut App, width: f32) {
             ui.spacing_mut().slider_width = ui.available_width() - 76.0;
             ui.spacing_mut().interact_size.y = 36.0;
             ui.spacing_mut().slider_rail_height = 8.0;
-            let mut beta = app.setup().config.beta;
+            let mut beta = app.setup().last_beta();
             let slider = Slider::new(&mut beta, 0.0..=1.0)
                 .clamping(egui::SliderClamping::Never)
                 .step_by(0.01)

@@ -4,7 +4,7 @@ use egui::DroppedFileHandle;
 
 use crate::ape::EnsembleFile;
 
-/// Files, in and out.
+/// Files, in and out; the address; what is kept from one visit to the next.
 pub trait Host {
     /// Gives a text to the visitor as a file; the error is a sentence.
     fn save(&mut self, name: &str, text: &str) -> Result<(), String>;
@@ -17,6 +17,34 @@ pub trait Host {
 
     /// A file that the visitor chose: its name, and its text or a sentence.
     fn opened(&mut self) -> Option<(String, Result<String, String>)>;
+
+    /// What follows `#` in the address: when the page is opened, and again when the visitor has changed it.
+    fn visited(&mut self) -> Option<String> {
+        None
+    }
+
+    /// Puts a text behind `#`; the page stays as it is.
+    fn set_address(&mut self, _fragment: &str) {}
+
+    /// The whole address with this text behind `#`.
+    fn link(&self, fragment: &str) -> String {
+        format!("#{fragment}")
+    }
+
+    /// Keeps a text for the next visit; the error is a sentence.
+    fn keep(&mut self, _name: &str, _text: &str) -> Result<(), String> {
+        Ok(())
+    }
+
+    /// A text that was kept.
+    fn kept(&self, _name: &str) -> Option<String> {
+        None
+    }
+
+    /// Whether the visitor has asked the system for less motion.
+    fn wants_less_motion(&self) -> bool {
+        false
+    }
 }
 
 /// Refuses a file that is too long before it is read.

@@ -6,9 +6,12 @@
 //! - heatmap: one policy on one grid. chart, table: figures over figures. theme: every colour, font and distance. numbers: how they are written.
 //!   widgets: small pieces that several parts use. focus: the ring around what the keyboard acts on.
 
+mod address;
 mod app;
 mod board;
 mod chart;
+mod commands;
+mod compare;
 mod controls;
 mod experiments;
 mod focus;
@@ -17,12 +20,18 @@ mod heatmap;
 mod help;
 mod host;
 mod inspector;
+mod lesson;
 mod numbers;
+mod page;
 mod panels;
+mod policy_table;
+mod settings;
 mod table;
 mod theme;
+mod timeline;
 mod toolbar;
 mod widgets;
+mod world;
 
 pub use app::App;
 pub use host::{Host, check_length};

@@ -50,6 +50,16 @@ pub fn percent(p: f64) -> String {
     }
 }
 
+/// β as it is set: no more decimals than it has.
+pub fn short_beta(beta: f64) -> String {
+    format!("{}", libm::round(beta * 1e4) / 1e4)
+}
+
+/// A digest: sixteen hexadecimal digits.
+pub fn digest(digest: u64) -> String {
+    format!("{digest:016x}")
+}
+
 /// A return of some kind.
 pub fn of_kind(kind: &ReturnKind, value: f64) -> String {
     if kind.is_steps { steps(value) } else { percent(value) }

@@ -71,6 +71,10 @@ pub struct Touched {
     pub cell: Option<usize>,
     /// The clones to show from now on.
     pub clones: Option<Vec<AttackerChoice>>,
+    /// The moment of the run to show.
+    pub update: Option<u32>,
+    /// β to go on with from the moment shown.
+    pub continue_with: Option<f64>,
 }
 
 /// Height of a panel's title.
@@ -110,6 +114,26 @@ impl Plan {
                 let width = width.min(height * aspect).floor().max(40.0);
                 Plan { columns, picture: vec2(width, width / aspect), is_rest_right }
             });
+        plans.reduce(|best, plan| if plan.picture.x > best.picture.x { plan } else { best }).expect("a page has panels")
+    }
+
+    /// So many columns over a width, as high as they come.
+    pub fn stacked(width: f32, columns: usize, grid: &Grid) -> Plan {
+        let picture = ((width - 2.0 * GAP * (columns - 1) as f32) / columns as f32).floor();
+        Plan { columns, picture: vec2(picture, picture * grid.rows() as f32 / grid.cols() as f32), is_rest_right: false }
+    }
+
+    /// The largest pictures in an area that is theirs alone.
+    pub fn filling(ui: &Ui, area: Vec2, panels: usize, grid: &Grid) -> Plan {
+        let title = title_height(ui);
+        let aspect = grid.cols() as f32 / grid.rows() as f32;
+        let plans = (1..=panels).map(|columns| {
+            let rows = panels.div_ceil(columns);
+            let width = (area.x - GAP * 2.0 * (columns - 1) as f32) / columns as f32;
+            let height = (area.y - 24.0 - GAP * rows as f32) / rows as f32 - title;
+            let width = width.min(height * aspect).floor().max(40.0);
+            Plan { columns, picture: vec2(width, width / aspect), is_rest_right: false }
+        });
         plans.reduce(|best, plan| if plan.picture.x > best.picture.x { plan } else { best }).expect("a page has panels")
     }
 

@@ -25,6 +25,8 @@ pub struct Palette {
     pub clone: Color32,
     pub warning: Color32,
     pub wall: Color32,
+    /// Runs kept to compare with.
+    kept: [Color32; 5],
 }
 
 const LIGHT: Palette = Palette {
@@ -40,6 +42,13 @@ const LIGHT: Palette = Palette {
     clone: Color32::from_rgb(0x8a, 0x2d, 0x8f),
     warning: Color32::from_rgb(0xa3, 0x40, 0x0b),
     wall: Color32::from_rgb(0xb4, 0xb8, 0xbe),
+    kept: [
+        Color32::from_rgb(0x2f, 0x5f, 0xb3),
+        Color32::from_rgb(0xa3, 0x5a, 0x00),
+        Color32::from_rgb(0x4f, 0x6f, 0x1c),
+        Color32::from_rgb(0xa8, 0x2a, 0x4f),
+        Color32::from_rgb(0x5a, 0x61, 0x6c),
+    ],
 };
 
 const DARK: Palette = Palette {
@@ -55,11 +64,23 @@ const DARK: Palette = Palette {
     clone: Color32::from_rgb(0xd9, 0x8f, 0xe3),
     warning: Color32::from_rgb(0xf2, 0xa0, 0x6a),
     wall: Color32::from_rgb(0x47, 0x4d, 0x57),
+    kept: [
+        Color32::from_rgb(0x8a, 0xb4, 0xf8),
+        Color32::from_rgb(0xf0, 0xb3, 0x5e),
+        Color32::from_rgb(0xa9, 0xcf, 0x6a),
+        Color32::from_rgb(0xf2, 0x93, 0xac),
+        Color32::from_rgb(0xa2, 0xa9, 0xb5),
+    ],
 };
 
 impl Palette {
     pub fn of(ui: &Ui) -> &'static Palette {
         Palette::of_theme(if ui.visuals().dark_mode { Theme::Dark } else { Theme::Light })
+    }
+
+    /// The colour of the kept run of this number: two lines of one colour belong together.
+    pub fn kept(&self, index: usize) -> Color32 {
+        self.kept[index % self.kept.len()]
     }
 
     fn of_theme(theme: Theme) -> &'static Palette {

@@ -1,10 +1,11 @@
-//! The bar on top: presets, play, step, reset, speed, theme, help.
+//! The bar on top: presets, play, step, reset, speed; keep, link, export, find, settings, help.
 
-use egui::{Align, ComboBox, Layout, RichText, Slider, ThemePreference, Ui};
+use egui::{Align, ComboBox, Layout, RichText, Slider, Ui};
 
 use super::app::App;
 use super::theme::{self, Palette};
 use super::widgets::{Icon, icon_button};
+use super::{commands, settings};
 use crate::experiment::PRESETS;
 use crate::lab::{Command, RunState};
 
@@ -36,10 +37,12 @@ pub fn show(ui: &mut Ui, app: &mut App) {
 
 fn at_the_right(ui: &mut Ui, app: &mut App) {
     ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-        if icon_button(ui, Icon::Help, "What is this?", false).clicked() {
-            app.view.is_help_open = !app.view.is_help_open;
-        }
-        theme_button(ui);
+        commands::button(ui, app, "help");
+        settings_menu(ui, app);
+        commands::button(ui, app, "palette");
+        export_menu(ui, app);
+        commands::button(ui, app, "link");
+        commands::button(ui, app, "pin");
     });
 }
 
@@ -74,15 +77,12 @@ fn transport(ui: &mut Ui, app: &mut App) {
             Some(RunState::Finished) => (Icon::Play, "Train on for another run"),
             _ => (Icon::Play, "Play"),
         };
-        if icon_button(ui, icon, name, true).clicked() {
-            app.send(if is_playing { Command::Pause } else { Command::Play });
+        let play = commands::named("play");
+        if icon_button(ui, icon, name, true).on_hover_text(play.tip()).clicked() {
+            (play.run)(app, ui.ctx());
         }
-        if icon_button(ui, Icon::Step, "One update", false).clicked() {
-            app.send(Command::Step);
-        }
-        if icon_button(ui, Icon::Reset, "Back to the start", false).clicked() {
-            app.send(Command::Reset);
-        }
+        commands::button(ui, app, "step");
+        commands::button(ui, app, "reset");
     });
 }
 
@@ -103,14 +103,23 @@ pub fn speed(ui: &mut Ui, app: &mut App) {
     });
 }
 
-fn theme_button(ui: &mut Ui) {
-    let now = ui.ctx().options(|options| options.theme_preference);
-    let (icon, name, next) = match now {
-        ThemePreference::System => (Icon::Auto, "Theme: as the system. Switch to light", ThemePreference::Light),
-        ThemePreference::Light => (Icon::Sun, "Theme: light. Switch to dark", ThemePreference::Dark),
-        ThemePreference::Dark => (Icon::Moon, "Theme: dark. Switch to the system's", ThemePreference::System),
-    };
-    if icon_button(ui, icon, name, false).clicked() {
-        ui.ctx().set_theme(next);
-    }
+/// What can be taken away from the page, and brought to it.
+fn export_menu(ui: &mut Ui, app: &mut App) {
+    let button = icon_button(ui, Icon::Save, "Export and open", false);
+    egui::Popup::menu(&button).show(|ui| {
+        for name in ["figure", "figure png", "curve", "ensemble", "model"] {
+            commands::menu_line(ui, app, name);
+        }
+        ui.separator();
+        for name in ["open", "table"] {
+            commands::menu_line(ui, app, name);
+        }
+    });
+}
+
+fn settings_menu(ui: &mut Ui, app: &mut App) {
+    let button = icon_button(ui, Icon::Settings, "Settings", false);
+    egui::Popup::menu(&button)
+        .close_behavior(egui::PopupCloseBehavior::CloseOnClickOutside)
+        .show(|ui| settings::show(ui, app));
 }

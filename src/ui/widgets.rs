@@ -20,6 +20,14 @@ pub enum Icon {
     Add,
     Remove,
     Dice,
+    Earlier,
+    Later,
+    Pin,
+    Link,
+    Save,
+    Settings,
+    Search,
+    Table,
 }
 
 impl Icon {
@@ -80,6 +88,46 @@ impl Icon {
                 let half = (0..=20).map(|i| c + r * egui::Vec2::angled(std::f32::consts::PI * (i as f32 / 20.0 - 0.5)));
                 painter.add(Shape::convex_polygon(half.collect(), color, Stroke::NONE));
             }
+            Icon::Later => {
+                painter.add(Shape::line(vec![pos2(c.x - r * 0.4, c.y - r), pos2(c.x + r * 0.6, c.y), pos2(c.x - r * 0.4, c.y + r)], stroke));
+            }
+            Icon::Earlier => {
+                painter.add(Shape::line(vec![pos2(c.x + r * 0.4, c.y - r), pos2(c.x - r * 0.6, c.y), pos2(c.x + r * 0.4, c.y + r)], stroke));
+            }
+            Icon::Pin => {
+                painter.circle_filled(c - vec2(0.0, r * 0.45), r * 0.62, color);
+                painter.line_segment([c, c + vec2(0.0, r * 1.15)], stroke);
+            }
+            Icon::Link => {
+                let to = c + vec2(r * 0.75, -r * 0.7);
+                for at in [c - vec2(r * 0.75, 0.0), to, c + vec2(r * 0.75, r * 0.7)] {
+                    painter.line_segment([c - vec2(r * 0.75, 0.0), at], stroke);
+                    painter.circle_filled(at, r * 0.36, color);
+                }
+            }
+            Icon::Save => {
+                painter.line_segment([c - vec2(0.0, r), c + vec2(0.0, r * 0.3)], stroke);
+                let tip = c + vec2(0.0, r * 0.5);
+                painter.add(Shape::line(vec![tip + vec2(-r * 0.6, -r * 0.6), tip, tip + vec2(r * 0.6, -r * 0.6)], stroke));
+                painter.line_segment([c + vec2(-r, r), c + vec2(r, r)], stroke);
+            }
+            Icon::Settings => {
+                for (row, at) in [(-0.7, 0.4), (0.0, -0.4), (0.7, 0.1)] {
+                    painter.line_segment([c + vec2(-r, r * row), c + vec2(r, r * row)], stroke);
+                    painter.circle_filled(c + vec2(r * at, r * row), r * 0.32, color);
+                }
+            }
+            Icon::Search => {
+                let middle = c - vec2(r * 0.2, r * 0.2);
+                painter.circle_stroke(middle, r * 0.68, stroke);
+                painter.line_segment([middle + vec2(r * 0.5, r * 0.5), c + vec2(r, r)], stroke);
+            }
+            Icon::Table => {
+                let frame = Rect::from_center_size(c, vec2(r, r * 0.85) * 2.0);
+                painter.rect_stroke(frame, 1.0, stroke, StrokeKind::Middle);
+                painter.line_segment([pos2(frame.left(), c.y - r * 0.25), pos2(frame.right(), c.y - r * 0.25)], stroke);
+                painter.line_segment([pos2(c.x - r * 0.25, frame.top()), pos2(c.x - r * 0.25, frame.bottom())], stroke);
+            }
             Icon::Help => text("?"),
             Icon::Add => text("+"),
             Icon::Remove => text("×"),
@@ -115,7 +163,12 @@ pub fn section(ui: &mut Ui, title: &str) {
 
 /// A row of words of which one is chosen.
 pub fn choose<T: PartialEq + Copy>(ui: &mut Ui, name: &str, chosen: &mut T, options: &[(T, &str, &str)]) {
-    ui.horizontal(|ui| {
+    ui.horizontal(|ui| choose_wrapped(ui, name, chosen, options));
+}
+
+/// The same among what stands in a line already.
+pub fn choose_wrapped<T: PartialEq + Copy>(ui: &mut Ui, name: &str, chosen: &mut T, options: &[(T, &str, &str)]) {
+    ui.scope(|ui| {
         ui.spacing_mut().item_spacing.x = 2.0;
         ui.spacing_mut().button_padding.x = 9.0;
         for &(value, label, help) in options {

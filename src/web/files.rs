@@ -1,4 +1,4 @@
-//! Files of a browser: downloads, a file picker, and files dropped on the page.
+//! What a browser gives the page: downloads, a file picker, files dropped on it, and storage.
 
 use std::cell::RefCell;
 use std::collections::VecDeque;
@@ -10,6 +10,7 @@ use wasm_bindgen::prelude::*;
 use wasm_bindgen_futures::{JsFuture, spawn_local};
 use web_sys::{Blob, File, HtmlAnchorElement, HtmlInputElement, Url};
 
+use super::place::Place;
 use crate::ui::{Host, check_length};
 
 type Inbox = Rc<RefCell<VecDeque<(String, Result<String, String>)>>>;
@@ -19,12 +20,14 @@ pub struct Files {
     wake: Rc<dyn Fn()>,
     inbox: Inbox,
     picker: Option<(HtmlInputElement, Closure<dyn Fn()>)>,
+    place: Place,
 }
 
 impl Files {
     /// `wake` is called when a file has been read.
     pub fn new(wake: impl Fn() + 'static) -> Files {
-        Files { wake: Rc::new(wake), inbox: Inbox::default(), picker: None }
+        let wake: Rc<dyn Fn()> = Rc::new(wake);
+        Files { place: Place::new(wake.clone()), wake, inbox: Inbox::default(), picker: None }
     }
 
     fn pick(&mut self) -> Result<(), JsValue> {
@@ -64,6 +67,41 @@ impl Host for Files {
     fn opened(&mut self) -> Option<(String, Result<String, String>)> {
         self.inbox.borrow_mut().pop_front()
     }
+
+    fn visited(&mut self) -> Option<String> {
+        self.place.visited()
+    }
+
+    fn set_address(&mut self, fragment: &str) {
+        self.place.set(fragment);
+    }
+
+    fn link(&self, fragment: &str) -> String {
+        self.place.link(fragment)
+    }
+
+    fn keep(&mut self, name: &str, text: &str) -> Result<(), String> {
+        let storage = storage().ok_or("This browser keeps nothing for the next visit.")?;
+        storage.set_item(&key(name), text).map_err(|_| "There is no room left in this browser's storage.".to_owned())
+    }
+
+    fn kept(&self, name: &str) -> Option<String> {
+        storage()?.get_item(&key(name)).ok()?
+    }
+
+    fn wants_less_motion(&self) -> bool {
+        let query = web_sys::window().and_then(|window| window.match_media("(prefers-reduced-motion: reduce)").ok()?);
+        query.is_some_and(|query| query.matches())
+    }
+}
+
+/// What the page keeps, under names of its own.
+fn storage() -> Option<web_sys::Storage> {
+    web_sys::window()?.local_storage().ok()?
+}
+
+fn key(name: &str) -> String {
+    format!("ape-lab.{name}")
 }
 
 /// Reads a file, if it is not too long, and puts it in the inbox.

@@ -6,4 +6,6 @@ mod files;
 mod mirror;
 #[cfg(feature = "page")]
 pub mod page;
+#[cfg(feature = "page")]
+mod place;
 pub mod worker;

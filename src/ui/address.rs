@@ -1,0 +1,198 @@
+//! The page in its address: what is shown, so that a reload or another visitor sees the same.
+
+use egui::Context;
+
+use super::app::{App, Promise, TABS, View};
+use super::lesson;
+use crate::attack::AttackerChoice;
+use crate::experiment::address::{AddressError, Pairs, bad, decode, encode, finish, read, read_cell, take, write};
+use crate::experiment::{PRESETS, Setup};
+use crate::lab::RunState;
+use crate::mdp::{Grid, RETURN_KINDS};
+
+/// Least time between two changes of the address, in seconds: browsers refuse more.
+const PAUSE: f64 = 0.5;
+/// Turns of β that a link holds.
+const MOST_TURNS: usize = 200;
+/// The file that the visitor has opened, kept over a reload: its name, and in the next line its text.
+const FILE: &str = "ensemble";
+
+impl App {
+    /// What is on the page as the text behind `#`.
+    pub(super) fn fragment(&self) -> String {
+        let mut setup = self.setup.clone();
+        if setup.course.turns.len() > MOST_TURNS {
+            setup.course.turns.clear();
+        }
+        let mut pairs = write(&setup);
+        let view = &self.view;
+        let mut put = |name: &str, value: String| pairs.push((name.to_owned(), value));
+        if let Some(name) = &self.opened {
+            put("file", name.clone());
+        }
+        let (_, tab, ..) = TABS.iter().find(|(tab, ..)| *tab == view.tab).unwrap_or(&TABS[1]);
+        if *tab != "train" {
+            put("tab", (*tab).to_owned());
+        }
+        if view.step > 0 {
+            put("step", (view.step + 1).to_string());
+        }
+        if view.kind > 0 {
+            put("return", RETURN_KINDS[view.kind].name.to_owned());
+        }
+        if view.clones != App::usual_clones(setup.config.observer) {
+            put("clones", view.clones.iter().map(AttackerChoice::to_string).collect::<Vec<_>>().join(";"));
+        }
+        let Some((started, snapshot)) = self.shown() else { return encode(&pairs) };
+        let cols = started.setup.grid.cols as usize;
+        if let Some(cell) = view.cell {
+            put("cell", format!("{},{}", cell / cols, cell % cols));
+        }
+        let is_resting = matches!(snapshot.state, RunState::Paused | RunState::Finished) && !self.is_retraining();
+        // While it changes, the end of the run is what is linked to.
+        if is_resting && setup.course.turns.len() == self.setup.course.turns.len() {
+            if snapshot.update != snapshot.last_update {
+                put("at", snapshot.update.to_string());
+            }
+            put("digest", super::numbers::digest(snapshot.digest));
+        }
+        encode(&pairs)
+    }
+
+    /// Puts what is on the page into the address, where that has changed and it is time.
+    pub(super) fn update_address(&mut self, ctx: &Context) {
+        // Until the first run is there, or the promised moment, the address is the visitor's.
+        if self.shown.is_none() || self.promise.is_some() || self.is_playing() {
+            return;
+        }
+        let wait = self.address.1 + PAUSE - self.now;
+        if wait > 0.0 {
+            return ctx.request_repaint_after_secs(wait as f32);
+        }
+        let fragment = self.fragment();
+        if fragment != self.address.0 {
+            self.host.set_address(&fragment);
+            self.address = (fragment, self.now);
+        }
+    }
+
+    pub(super) fn copy_link(&mut self, ctx: &Context) {
+        let link = self.host.link(&self.fragment());
+        ctx.copy_text(link);
+        self.notice = Some(match &self.opened {
+            Some(name) => format!(
+                "Link copied. The ensemble of {name} is too large for a link: whoever opens it needs the file as well."
+            ),
+            None => "Link copied: whoever opens it sees the same, to the last bit.".to_owned(),
+        });
+    }
+
+    /// Keeps a file for the next visit of this visitor.
+    pub(super) fn keep_file(&mut self, name: &str, text: &str) -> Result<(), String> {
+        self.host.keep(FILE, &format!("{name}\n{text}")).map_err(|error| format!("{error} A reload will not bring {name} back."))
+    }
+
+    /// Shows what an address says; where it is no good, says why and shows the default.
+    pub(super) fn visit(&mut self, fragment: &str) {
+        if fragment.is_empty() {
+            return;
+        }
+        match self.read_address(fragment) {
+            Ok(None) => {}
+            Ok(Some(name)) => {
+                let kept = self.host.kept(FILE);
+                let text = kept.as_deref().and_then(|kept| kept.strip_prefix(&format!("{name}\n")));
+                match text.map(str::to_owned) {
+                    Some(text) => self.open(name, Ok(text)),
+                    None => {
+                        self.load_preset(0);
+                        let sentence = format!(
+                            "This link shows the ensemble of {name}, which is not in the link: open the file, or drop it here."
+                        );
+                        self.notice = Some(sentence);
+                    }
+                }
+            }
+            Err(error) => {
+                self.load_preset(0);
+                self.notice = Some(format!("This link cannot be read: {error}. Here is the default instead."));
+            }
+        }
+    }
+
+    /// Takes up what an address says; returns the name of the file that it is about, where there is one.
+    fn read_address(&mut self, fragment: &str) -> Result<Option<String>, AddressError> {
+        let mut pairs = decode(fragment)?;
+        let file = take(&mut pairs, "file");
+        let setup = read(&mut pairs)?;
+        let mut view = View { cell: None, kind: 0, step: 0, tab: super::app::Tab::Train, ..self.view.clone() };
+        let mut clones = App::usual_clones(setup.config.observer);
+        read_view(&mut pairs, &setup, &mut view, &mut clones)?;
+        let promise = read_promise(&mut pairs)?;
+        finish(&pairs)?;
+        let preset = PRESETS.iter().position(|preset| (preset.setup)() == setup);
+        self.begin(setup, preset);
+        self.view = view;
+        self.show_clones(clones);
+        self.promise = Some(promise).filter(|promise| *promise != Promise { update: None, digest: None });
+        Ok(file)
+    }
+}
+
+fn read_view(
+    pairs: &mut Pairs,
+    setup: &Setup,
+    view: &mut View,
+    clones: &mut Vec<AttackerChoice>,
+) -> Result<(), AddressError> {
+    if let Some(value) = take(pairs, "tab") {
+        let Some((tab, ..)) = TABS.iter().find(|(_, name, ..)| *name == value) else {
+            let names: Vec<&str> = TABS.iter().map(|(_, name, ..)| *name).collect();
+            return bad("tab", &value, &format!("one of {}", names.join(", ")));
+        };
+        view.tab = *tab;
+    }
+    if let Some(value) = take(pairs, "step") {
+        match value.parse::<usize>() {
+            Ok(step @ 1..) if step <= lesson::STEPS.len() => view.step = step - 1,
+            _ => return bad("step", &value, &format!("a number from 1 to {}", lesson::STEPS.len())),
+        }
+    }
+    if let Some(value) = take(pairs, "return") {
+        let Some(kind) = RETURN_KINDS.iter().position(|kind| kind.name == value) else {
+            let names: Vec<&str> = RETURN_KINDS.iter().map(|kind| kind.name).collect();
+            return bad("return", &value, &format!("one of {}", names.join(", ")));
+        };
+        view.kind = kind;
+    }
+    if let Some(value) = take(pairs, "clones") {
+        match value.split(';').map(str::parse).collect::<Result<Vec<AttackerChoice>, _>>() {
+            Ok(read) if (1..=2).contains(&read.len()) => *clones = read,
+            _ => return bad("clones", &value, "one or two cloners, as uniform;occupancy"),
+        }
+    }
+    if let Some(value) = take(pairs, "cell") {
+        let grid = Grid::new(setup.grid.clone()).ok();
+        let cell = read_cell(&value).filter(|(row, col)| *row < setup.grid.rows && *col < setup.grid.cols);
+        let (Some((row, col)), Some(grid)) = (cell, grid) else { return bad("cell", &value, "row,column of the grid") };
+        view.cell = Some(row as usize * grid.cols() + col as usize);
+    }
+    Ok(())
+}
+
+fn read_promise(pairs: &mut Pairs) -> Result<Promise, AddressError> {
+    let mut promise = Promise { update: None, digest: None };
+    if let Some(value) = take(pairs, "at") {
+        match value.parse() {
+            Ok(update) => promise.update = Some(update),
+            Err(_) => return bad("at", &value, "an update of the run, a whole number"),
+        }
+    }
+    if let Some(value) = take(pairs, "digest") {
+        match u64::from_str_radix(&value, 16) {
+            Ok(digest) if value.len() == 16 => promise.digest = Some(digest),
+            _ => return bad("digest", &value, "16 hexadecimal digits"),
+        }
+    }
+    Ok(promise)
+}

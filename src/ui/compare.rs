@@ -1,0 +1,116 @@
+//! Runs that stay on the page: their figures stand under those of the run shown, their curves behind its curve.
+
+use egui::{Color32, Grid, RichText, ScrollArea, Ui};
+
+use super::app::App;
+use super::board::Shown;
+use super::numbers;
+use super::theme::{self, Palette};
+use super::widgets::{Icon, icon_button};
+use crate::mdp::{KnownReturns, RETURN_KINDS};
+
+/// A run that is kept as it was last seen.
+pub struct Kept {
+    pub shown: Shown,
+    /// What tells it from the others.
+    pub name: String,
+}
+
+/// Most runs that are kept; the oldest gives way.
+const MOST: usize = 5;
+
+impl App {
+    /// Keeps the run shown, to lay the next beside it.
+    pub fn pin(&mut self) {
+        if let Some(shown) = self.shown.clone() {
+            self.keep(shown);
+        }
+    }
+
+    pub(super) fn keep(&mut self, shown: Shown) {
+        let name = name(&shown);
+        // The same moment of the same run twice says nothing.
+        self.kept.retain(|kept| kept.name != name || kept.shown.snapshot.digest != shown.snapshot.digest);
+        self.kept.push(Kept { shown, name });
+        if self.kept.len() > MOST {
+            self.kept.remove(0);
+        }
+    }
+
+    /// Brings a kept run back: it is trained again, to the same digest.
+    fn bring_back(&mut self, index: usize) {
+        let Kept { shown, .. } = &self.kept[index];
+        let snapshot = &shown.snapshot;
+        let mut setup = shown.started.setup.clone();
+        setup.course = snapshot.course.clone();
+        let promise = super::app::Promise { update: Some(snapshot.update), digest: Some(snapshot.digest) };
+        let is_trained = setup.ensemble.is_none();
+        self.begin(setup, None);
+        self.promise = Some(promise).filter(|_| is_trained);
+    }
+}
+
+/// What a run is called: what it differs in from others.
+fn name(shown: &Shown) -> String {
+    let (setup, snapshot) = (&shown.started.setup, &shown.snapshot);
+    let config = &setup.config;
+    let beta = snapshot.course.turns.iter().fold(numbers::short_beta(config.beta), |text, (update, beta)| {
+        format!("{text}, from {update} on {}", numbers::short_beta(*beta))
+    });
+    let beta: String = if snapshot.course.turns.len() > 3 { "β on a course".to_owned() } else { format!("β {beta}") };
+    match setup.ensemble {
+        Some(_) => "given ensemble".to_owned(),
+        None => format!("{beta} · {} · n {} · seed {}", config.observer, config.experts, config.seed),
+    }
+}
+
+/// The figures of the kept runs, each with its colour on the chart.
+pub fn show(ui: &mut Ui, app: &mut App) {
+    if app.kept.is_empty() {
+        return;
+    }
+    let palette = Palette::of(ui);
+    let kind = &RETURN_KINDS[app.view.kind];
+    let (mut dropped, mut brought) = (None, None);
+    let small = |ui: &mut Ui, text: String, color: Color32| {
+        ui.add(egui::Label::new(RichText::new(text).small().color(color)).extend());
+    };
+    ui.add_space(4.0);
+    ScrollArea::horizontal().id_salt("kept").show(ui, |ui| {
+        Grid::new("kept").spacing([14.0, 2.0]).min_col_width(0.0).show(ui, |ui| {
+            for head in ["Kept to compare", "ensemble", "clone", "clone ÷ ensemble", "update", "digest", "", ""] {
+                small(ui, head.to_owned(), palette.muted);
+            }
+            ui.end_row();
+            for (index, kept) in app.kept.iter().enumerate() {
+                let snapshot = &kept.shown.snapshot;
+                let clone: Option<&KnownReturns> = snapshot.clones.first().map(|clone| &clone.view.returns);
+                let clone = clone.and_then(|clone| clone.get(app.view.kind));
+                let ensemble = (kind.get)(&snapshot.ensemble);
+                let of_clone = clone.map_or("–".to_owned(), |clone| numbers::of_kind(kind, clone));
+                let ratio = clone.filter(|_| kind.is_steps).map(|clone| numbers::decimal(clone / ensemble, 1) + "×");
+                small(ui, format!("— {}", kept.name), palette.kept(index));
+                small(ui, numbers::of_kind(kind, ensemble), palette.ink);
+                small(ui, of_clone, palette.ink);
+                small(ui, ratio.unwrap_or("–".to_owned()), palette.ink);
+                small(ui, snapshot.update.to_string(), palette.ink);
+                small(ui, numbers::digest(snapshot.digest), palette.muted);
+                let response = ui.small_button("Show again").on_hover_text("Trains it again, to the same digest");
+                if response.accessible_name(format!("Show again: {}", kept.name)).clicked() {
+                    brought = Some(index);
+                }
+                if icon_button(ui, Icon::Remove, &format!("Drop: {}", kept.name), false).clicked() {
+                    dropped = Some(index);
+                }
+                ui.end_row();
+            }
+        });
+    });
+    if let Some(index) = brought {
+        app.bring_back(index);
+    }
+    if let Some(index) = dropped {
+        app.kept.remove(index);
+    }
+    ui.add_space(theme::GAP / 2.0);
+}

@@ -1,0 +1,117 @@
+//! How the page looks to this visitor: kept for the next visit, and no part of a link.
+
+use egui::{Context, RichText, ThemePreference, Ui};
+use serde::{Deserialize, Serialize};
+
+use super::app::App;
+use super::theme::{self, Palette};
+use super::widgets::choose;
+
+/// What a visitor prefers.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Preferences {
+    pub theme: Theme,
+    /// Place in [`crate::picture::COLOR_MAPS`].
+    pub color_map: usize,
+    /// Times the usual size.
+    pub text_size: f32,
+    pub motion: Motion,
+    /// Whether every control's explanation stands beside it.
+    pub explains: bool,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub enum Theme {
+    System,
+    Light,
+    Dark,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub enum Motion {
+    System,
+    Less,
+}
+
+impl Default for Preferences {
+    fn default() -> Self {
+        Preferences { theme: Theme::System, color_map: 0, text_size: 1.0, motion: Motion::System, explains: false }
+    }
+}
+
+/// Sizes of text on offer.
+pub const TEXT_SIZES: [(f32, &str, &str); 4] = [
+    (1.0, "100 %", "As designed"),
+    (1.15, "115 %", "A little larger"),
+    (1.3, "130 %", "Larger"),
+    (1.6, "160 %", "Much larger: for the last row"),
+];
+
+const NAME: &str = "preferences";
+
+impl App {
+    /// Takes up what was preferred at the last visit.
+    pub(super) fn recall_preferences(&mut self, ctx: &Context) {
+        let kept = self.host.kept(NAME).and_then(|text| serde_json::from_str(&text).ok());
+        let mut preferences: Preferences = kept.unwrap_or_default();
+        // What was kept may be of another version.
+        if !TEXT_SIZES.iter().any(|(size, ..)| *size == preferences.text_size) {
+            preferences.text_size = 1.0;
+        }
+        preferences.color_map = preferences.color_map.min(theme::COLOR_MAPS.len() - 1);
+        self.preferences = preferences;
+        self.apply_preferences(ctx);
+    }
+
+    /// Prefers something else from now on.
+    pub fn prefer(&mut self, preferences: Preferences, ctx: &Context) {
+        if preferences != self.preferences {
+            self.preferences = preferences;
+            self.apply_preferences(ctx);
+            if let Ok(text) = serde_json::to_string(&preferences) {
+                self.notice = self.host.keep(NAME, &text).err();
+            }
+        }
+    }
+
+    fn apply_preferences(&self, ctx: &Context) {
+        ctx.set_theme(match self.preferences.theme {
+            Theme::System => ThemePreference::System,
+            Theme::Light => ThemePreference::Light,
+            Theme::Dark => ThemePreference::Dark,
+        });
+        ctx.set_zoom_factor(self.preferences.text_size);
+        theme::set_motion(ctx, self.preferences.motion == Motion::System && !self.host.wants_less_motion());
+    }
+}
+
+/// The menu of settings.
+pub fn show(ui: &mut Ui, app: &mut App) {
+    let palette = Palette::of(ui);
+    let mut now = app.preferences;
+    let head = |ui: &mut Ui, text: &str| _ = ui.label(RichText::new(text).small().color(palette.muted));
+    ui.set_max_width(320.0);
+    head(ui, "Theme");
+    let themes = [
+        (Theme::System, "system", "As the system has it"),
+        (Theme::Light, "light", "Dark on light"),
+        (Theme::Dark, "dark", "Light on dark"),
+    ];
+    choose(ui, "Theme", &mut now.theme, &themes);
+    head(ui, "Colours of the heatmaps");
+    let maps: Vec<(usize, &str, &str)> =
+        theme::COLOR_MAPS.iter().enumerate().map(|(index, map)| (index, map.title, map.summary)).collect();
+    choose(ui, "Colours", &mut now.color_map, &maps);
+    head(ui, "Text size");
+    choose(ui, "Text size", &mut now.text_size, &TEXT_SIZES);
+    head(ui, "Motion");
+    let motions = [
+        (Motion::System, "as the system", "Races move unless the system asks for less motion"),
+        (Motion::Less, "less", "Nothing moves by itself: a race shows its end at once"),
+    ];
+    choose(ui, "Motion", &mut now.motion, &motions);
+    ui.checkbox(&mut now.explains, "Explain every control")
+        .on_hover_text("What a control does, the paper's value and equation stand under it; without a pointer, too");
+    app.prefer(now, ui.ctx());
+}
