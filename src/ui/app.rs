@@ -54,6 +54,8 @@ pub struct View {
     pub tab: Tab,
     /// Place in [`crate::mdp::RETURN_KINDS`] of the return that is shown.
     pub kind: usize,
+    /// Place in [`crate::picture::COLOR_MAPS`] of the heatmaps' colours.
+    pub color_map: usize,
     /// Who clones, one for each clone panel; the first is in the headline too.
     pub clones: Vec<AttackerChoice>,
     pub beta_mode: BetaMode,
@@ -125,6 +127,7 @@ impl App {
             view: View {
                 tab: Tab::Train,
                 kind: 0,
+                color_map: 0,
                 clones: Vec::new(),
                 beta_mode: BetaMode::Retrain,
                 speed: 5,
@@ -552,7 +555,7 @@ impl App {
             choose(ui, "Tab", &mut self.view.tab, &options);
             if self.view.tab == Tab::Train && !is_stacked {
                 ui.add_space(SPACE);
-                heatmap::color_bar(ui);
+                heatmap::color_bar(ui, self.view.color_map);
             }
         });
         ui.add_space(2.0);

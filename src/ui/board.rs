@@ -35,7 +35,7 @@ impl Shown {
     /// Everything below one another, for narrow pages.
     pub fn show_stacked(&self, ui: &mut Ui, view: &View, pictures: &mut Pictures) -> Touched {
         ui.add_space(GAP);
-        heatmap::color_bar(ui);
+        heatmap::color_bar(ui, view.color_map);
         let width = ui.available_width();
         let columns = if width < NARROW { 2 } else { 3 };
         let picture = ((width - 2.0 * GAP * (columns - 1) as f32) / columns as f32).floor();

@@ -157,7 +157,8 @@ pub fn show(
             let id = egui::Id::unique(("heatmap", &panel.title));
             let name = describe(&panel.title, policy);
             let rewards = if panel.clone.is_some() { rewards } else { &[] };
-            let heatmap = Heatmap { id, name: &name, grid, policy, version, marked: view.cell, rewards };
+            let View { cell: marked, color_map, .. } = *view;
+            let heatmap = Heatmap { id, name: &name, grid, policy, version, marked, rewards, color_map };
             let cell = heatmap.show(ui, picture, pictures);
             touched.cell = touched.cell.or(cell);
         }
