@@ -7,7 +7,8 @@
 //! - [`attack`]: the cloners, from behaviour cloning to a recurrent network, and what their clones return.
 //! - [`experiment`]: what a run starts from, the presets, and the course of a run.
 //! - [`lab`]: a training session as a state machine with messages in and out, and a thread to run it.
-//! - `report`: pictures, and the results of all experiments as a document.
+//! - `picture`: heat maps and charts as SVG, and the maps from steps to colours.
+//! - `report`: the results of all experiments as a document.
 //! - `ui`: the page, in egui and nothing else.
 //! - `web`: what only a browser has: the worker, the mirror of the page for assistive technology.
 //!
@@ -19,6 +20,8 @@ pub mod attack;
 pub mod experiment;
 pub mod lab;
 pub mod mdp;
+#[cfg(any(feature = "page", feature = "cli"))]
+pub mod picture;
 #[cfg(feature = "cli")]
 pub mod report;
 #[cfg(feature = "page")]

@@ -115,7 +115,7 @@ fn bad_flags_get_one_sentence() {
     assert!(complaint(&["train", "--learning-rate"]).contains("--learning-rate"));
     assert!(complaint(&["train", "--no-such-flag"]).contains("--no-such-flag"));
     assert!(complaint(&["train", "--seed", "-1"]).contains("--seed -1"));
-    assert!(complaint(&[]).contains("evaluate, train, attack, table1, sweep, results, presets"));
+    assert!(complaint(&[]).contains("evaluate, train, model, attack, table1, sweep, results, presets"));
     assert!(complaint(&["train", "--alpha", "5"]).contains("--alpha 5: must be none, or a return from -10000"));
     assert!(complaint(&["train", "--adversary-reward", "9;9"]).contains("must be none, or rewards as 9,9=-1"));
     let outside = complaint(&["train", "--adversary-reward", "10,0=1"]);
@@ -188,6 +188,26 @@ fn bad_files_get_one_sentence_and_leave_nothing_behind() {
     std::fs::create_dir_all(folder.join("kept")).unwrap();
     complaint(&["train", "--total-steps", "1", "--out", folder.to_str().unwrap()]);
     assert!(!file("folder.json.part").exists());
+}
+
+/// The model is that of the grid the flags start from, a given ensemble's too, with no flags of a training run.
+#[test]
+fn the_model_of_a_grid_is_written() {
+    let (config, out) = (file("grid.json"), file("model.json"));
+    let grid = json!({"rows": 2, "cols": 3, "goal": [0, 0], "walls": [[1, 1]], "slip": 0.5});
+    std::fs::write(&config, json!({ "grid": grid }).to_string()).unwrap();
+    let output = ape(&["model", "--config", config.to_str().unwrap(), "--out", out.to_str().unwrap()]);
+    assert!(output.status.success() && output.stdout.is_empty(), "{}", String::from_utf8_lossy(&output.stderr));
+    let model: Value = serde_json::from_str(&std::fs::read_to_string(&out).unwrap()).unwrap();
+    assert_eq!(model["actions"], json!(["Up", "Down", "Left", "Right", "Stay"]));
+    assert_eq!((&model["nS"], &model["nA"], &model["shape"]), (&json!(6), &json!(5), &json!([2, 3])));
+    assert_eq!((&model["goal"], &model["walls"]), (&json!(0), &json!([4])));
+    assert_eq!(model["P"]["1"]["2"], json!([[0.6, 0, -1.0, true], [0.3, 1, -1.0, false], [0.1, 2, -1.0, false]]));
+    assert_eq!(model["P"]["0"]["3"], json!([[1.0, 0, 0.0, true]]));
+    assert_eq!(model["initial_state_distrib"], json!([0.0, 0.25, 0.25, 0.25, 0.0, 0.25]));
+    let trap: Value = serde_json::from_slice(&ape(&["model", "--preset", "trap"]).stdout).unwrap();
+    assert_eq!(trap["nS"], 100);
+    assert!(complaint(&["model", "--beta", "0.5"]).contains("--beta"));
 }
 
 /// Every cloner against a file, as a table, as JSON and as CSV.

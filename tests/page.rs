@@ -93,12 +93,21 @@ type NamedText = (String, Result<String, String>);
 struct Desktop {
     saved: Rc<RefCell<Vec<(String, String)>>>,
     to_open: Rc<RefCell<Vec<NamedText>>>,
+    failures: Rc<RefCell<Vec<String>>>,
 }
 
 impl Host for Desktop {
     fn save(&mut self, name: &str, text: &str) -> Result<(), String> {
         self.saved.borrow_mut().push((name.to_owned(), text.to_owned()));
         Ok(())
+    }
+
+    fn save_picture(&mut self, name: &str, svg: &str) -> Result<(), String> {
+        self.save(name, svg)
+    }
+
+    fn failure(&mut self) -> Option<String> {
+        self.failures.borrow_mut().pop()
     }
 
     fn ask_for_file(&mut self) -> Result<(), String> {
@@ -358,6 +367,83 @@ fn the_bench_attacks_what_is_shown_and_saves_it() {
     let (grid, ensemble) = EnsembleFile::parse(&saved[2].1).unwrap().check().unwrap();
     let returns = ape_lab::experiment::ensemble_returns(&grid, &ensemble, 100);
     assert_eq!(returns.capped_return, bench.ensemble.capped_return);
+}
+
+/// Picture, curve and model are those of the run on the page; a picture that fails later is told of.
+#[test]
+fn what_is_shown_can_be_taken_away() {
+    let desktop = Desktop::default();
+    let (mut page, _) = open_with(1280.0, 800.0, desktop.clone());
+    let take = |page: &mut Page| {
+        let app = page.state_mut().as_mut().unwrap();
+        app.export_picture();
+        app.export_png();
+        app.export_curve();
+        app.export_model();
+        std::mem::take(&mut *desktop.saved.borrow_mut())
+    };
+    let saved = take(&mut page);
+    let names: Vec<&str> = saved.iter().map(|(name, _)| &**name).collect();
+    assert_eq!(names, ["ape-panels.svg", "ape-panels.png", "ape-curve.csv", "ape-model.json"]);
+    let svg = &saved[0].1;
+    assert_eq!(&saved[1].1, svg);
+    // What the caption says stands on one line or on two.
+    let words = |svg: &str| -> String {
+        let texts = svg.split("</text>").filter_map(|part| part.rsplit_once('>')).map(|(_, words)| words);
+        texts.collect::<Vec<_>>().join(" ")
+    };
+    for said in [
+        "2 experts by PG-APE against the observer uniform (preset “Blind clone”): β = 0.60, seed 1, update 732 of 732.",
+        "Grid of 10 × 10 cells, goal in row 0, column 0, no walls, slip 0. T = 100 steps.",
+        "Return, capped, in steps: ensemble −16.38, clone (uniform) −98.",
+        "optimal −9.00. (−mean min(h(s), 100):",
+        "100 or more steps to the goal",
+        concat!("ape-lab ", env!("CARGO_PKG_VERSION"), ", digest "),
+    ] {
+        assert!(words(svg).contains(said), "{said}: {}", words(svg));
+    }
+    for panel in ["Expert 1", "Expert 2", "Clone (uniform)", "Clone (occupancy)", "Optimal"] {
+        assert!(svg.contains(&format!(">{panel}</text>")), "{panel}");
+    }
+    let curve: Vec<&str> = saved[2].1.lines().collect();
+    let last: Vec<&str> = curve.last().unwrap().split(',').collect();
+    assert!(curve[0].starts_with("update,beta,ensemble_capped_return") && curve[0].split(',').count() == last.len());
+    assert_eq!((last[0], &last[2][..6]), ("732", "-16.38"));
+    let model: ape_lab::mdp::TransitionModel = serde_json::from_str(&saved[3].1).unwrap();
+    assert_eq!((model.states, model.shape), (100, [10, 10]));
+
+    // Other colours, and a clone with a memory.
+    let app = page.state_mut().as_mut().unwrap();
+    app.view.color_map = 2;
+    page.run_steps(2);
+    page.get_by_label_contains("history: ").click_accesskit();
+    settle(&mut page);
+    let svg = &take(&mut page)[0].1;
+    assert!(words(svg).contains("observer history: ") && words(svg).contains("clone (history) −"), "{}", words(svg));
+    assert!(!words(svg).contains("preset") && svg.contains("stop-color=\"#ffffff\""));
+
+    // Nothing was trained of the trap: no seed, no digest, no curve.
+    page.state_mut().as_mut().unwrap().load_preset(6);
+    settle(&mut page);
+    page.run_steps(10);
+    let saved = take(&mut page);
+    assert_eq!(
+        saved.iter().map(|(name, _)| &**name).collect::<Vec<_>>(),
+        ["ape-panels.svg", "ape-panels.png", "ape-model.json"]
+    );
+    assert!(
+        words(&saved[0].1).contains("A given ensemble of 2 experts (preset “Trap”). Grid"),
+        "{}",
+        words(&saved[0].1)
+    );
+    assert!(
+        !words(&saved[0].1).contains("digest")
+            && words(&saved[0].1).contains("ensemble −11.27, clone (occupancy) −90.45")
+    );
+
+    desktop.failures.borrow_mut().push("ape-panels.png could not be drawn.".to_owned());
+    page.run_steps(3);
+    page.get_by(|node| says(node).is_some_and(|text| text == "ape-panels.png could not be drawn."));
 }
 
 /// A file that is no ensemble leaves everything as it is and says what is wrong; a good one is shown.

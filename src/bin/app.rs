@@ -49,6 +49,10 @@ mod window {
             std::fs::write(name, text).map_err(|error| format!("{name} could not be written: {error}."))
         }
 
+        fn save_picture(&mut self, _name: &str, _svg: &str) -> Result<(), String> {
+            Err("PNG is made by the page in a browser; here the picture is to be had as SVG.".to_owned())
+        }
+
         fn ask_for_file(&mut self) -> Result<(), String> {
             Err("Drop the file on this window.".to_owned())
         }

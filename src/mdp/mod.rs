@@ -3,12 +3,14 @@
 //! Everything here is exact or a single draw; nothing learns and nothing knows of ensembles.
 
 mod grid;
+mod model;
 mod optimal;
 mod policy;
 mod returns;
 mod rollout;
 
 pub use grid::{Action, Cell, Grid, GridError, GridSpec};
+pub use model::{Transition, TransitionModel, transition_model};
 pub use optimal::optimal_policy;
 pub use policy::{Policy, PolicyError};
 pub use returns::{CAP, HORIZON, KnownReturns, Occupancy, RETURN_KINDS, ReturnKind, Returns, Solver, Value, occupancy};

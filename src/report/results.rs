@@ -8,7 +8,6 @@ use std::time::Instant;
 
 use rayon::prelude::*;
 
-use super::picture::{Axes, Mark, Panel, Series, chart, heatmaps};
 use crate::ape::observer::ObserverChoice;
 use crate::ape::{AlgorithmKind, Config, Ensemble, EnsembleFile, Trainer};
 use crate::attack::{AttackerChoice, Target};
@@ -16,6 +15,7 @@ use crate::experiment::{
     Attack, CurvePoint, METHODS, Outcome, PRESETS, Setup, Summary, Sweep, SweepRun, Table1, Task, ensemble_returns,
 };
 use crate::mdp::{Grid, GridSpec, HORIZON, KnownReturns, Solver, optimal_policy};
+use crate::picture::{Axes, COLOR_MAPS, Mark, Panel, Series, chart, heatmaps};
 
 /// Does tasks, their outcomes in order.
 pub type Run<'a> = &'a dyn Fn(&[Task]) -> Result<Vec<Outcome>, String>;
@@ -159,9 +159,9 @@ fn pictures(document: &mut Document) -> Result<String, String> {
         let value = solver.evaluate(&best, HORIZON);
         policies.push(("Optimal".to_owned(), best, value.hitting_time, KnownReturns::from(value.returns)));
         let panels: Vec<Panel> = policies
-            .iter()
+            .into_iter()
             .map(|(title, policy, steps, returns)| Panel {
-                title: title.clone(),
+                title,
                 subtitle: format!(
                     "{} steps capped, {:.0} % arrive",
                     returns.capped_return.map_or(String::new(), |value| number(value, 1)),
@@ -169,10 +169,11 @@ fn pictures(document: &mut Document) -> Result<String, String> {
                 ),
                 policy,
                 steps,
+                rewards: Vec::new(),
             })
             .collect();
         let _ = writeln!(text, "**{title}**\n");
-        text += &document.picture(name, title, heatmaps(&grid, &panels));
+        text += &document.picture(name, title, heatmaps(&grid, &panels, &COLOR_MAPS[0], &[]));
         text += "\n";
     }
     text += "The experts go opposite ways where it hurts; the clone that weighs them equally undoes one with the other. Whoever \
@@ -687,18 +688,19 @@ fn semantics(document: &mut Document) -> Result<String, String> {
     let value = solver.evaluate(&clone, HORIZON);
     policies.push(("Clone, uniform".to_owned(), clone, value));
     let panels: Vec<Panel> = policies
-        .iter()
+        .into_iter()
         .map(|(title, policy, value)| Panel {
-            title: title.clone(),
+            title,
             subtitle: format!("{} steps within T", number(value.returns.horizon_return, 1)),
             policy,
-            steps: &value.hitting_time,
+            steps: value.hitting_time,
+            rewards: Vec::new(),
         })
         .collect();
     text += &document.picture(
         "lured",
         "Experts and the clone that they lure to the top right corner",
-        heatmaps(&grid, &panels),
+        heatmaps(&grid, &panels, &COLOR_MAPS[0], &[]),
     );
     text += "\nThe first row of the table, exact: the clone is led to the top right corner and stays there.\n";
     Ok(text)

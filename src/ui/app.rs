@@ -67,6 +67,8 @@ pub struct View {
     pub tab: Tab,
     /// Place in [`crate::mdp::RETURN_KINDS`] of the return that is shown.
     pub kind: usize,
+    /// Place in [`crate::picture::COLOR_MAPS`] of the heatmaps' colours.
+    pub color_map: usize,
     /// Who clones, one for each clone panel; the first is in the headline too.
     pub clones: Vec<AttackerChoice>,
     pub beta_mode: BetaMode,
@@ -172,6 +174,7 @@ impl App {
             view: View {
                 tab: Tab::Train,
                 kind: 0,
+                color_map: 0,
                 clones: Vec::new(),
                 beta_mode: BetaMode::Retrain,
                 speed: 5,
@@ -221,6 +224,11 @@ impl App {
     /// The run on the page and its latest snapshot.
     pub fn shown(&self) -> Option<(&Started, &Snapshot)> {
         self.shown.as_ref().map(|shown| (&shown.started, &shown.snapshot))
+    }
+
+    /// The same with its grid and curve.
+    pub fn board(&self) -> Option<&Shown> {
+        self.shown.as_ref()
     }
 
     /// What is collected of r̃, where the run denies the clone that.
@@ -301,6 +309,11 @@ impl App {
     /// Gives a file to the visitor.
     pub fn save(&mut self, name: &str, text: &str) {
         self.notice = self.host.save(name, text).err();
+    }
+
+    /// Gives a picture to the visitor as PNG.
+    pub fn save_picture(&mut self, name: &str, svg: &str) {
+        self.notice = self.host.save_picture(name, svg).err();
     }
 
     pub fn ask_for_file(&mut self) {
@@ -438,6 +451,9 @@ impl App {
         }
         while let Some(fragment) = self.host.visited() {
             self.visit(&fragment);
+        }
+        while let Some(sentence) = self.host.failure() {
+            self.notice = Some(sentence);
         }
     }
 

@@ -34,6 +34,17 @@ impl Shown {
         Some(Shown { started, snapshot, curve, version, grid })
     }
 
+    pub fn grid(&self) -> &Grid {
+        &self.grid
+    }
+
+    /// Cells with a reward r̃ of their own that the clone is to be denied, and the reward.
+    pub fn rewards(&self) -> Vec<(usize, f64)> {
+        let Some(reward) = &self.started.setup.config.adversary_reward else { return Vec::new() };
+        let of_cells = self.grid.starts().iter().map(|&s| (s as usize, reward.of_cell(self.grid.cell(s as usize))));
+        of_cells.filter(|(_, reward)| *reward != 0.0).collect()
+    }
+
     /// Everything below one another, for narrow pages.
     pub fn show_stacked(&self, ui: &mut Ui, view: &View, kept: &[Kept], pictures: &mut Pictures) -> Touched {
         ui.add_space(GAP);
@@ -84,12 +95,15 @@ impl Shown {
         touched
     }
 
-    pub fn show_panels(&self, ui: &mut Ui, panels: &[Panel], plan: &Plan, view: &View, pictures: &mut Pictures) -> Touched {
-        let reward = self.started.setup.config.adversary_reward.as_ref();
-        let rewards: Vec<(usize, f64)> = reward.map_or(Vec::new(), |reward| {
-            let of_cells = self.grid.starts().iter().map(|&s| (s as usize, reward.of_cell(self.grid.cell(s as usize))));
-            of_cells.filter(|(_, reward)| *reward != 0.0).collect()
-        });
+    pub fn show_panels(
+        &self,
+        ui: &mut Ui,
+        panels: &[Panel],
+        plan: &Plan,
+        view: &View,
+        pictures: &mut Pictures,
+    ) -> Touched {
+        let rewards = self.rewards();
         let ground = Ground { grid: &self.grid, version: self.version, rewards: &rewards };
         panels::show(ui, panels, plan, &ground, view, pictures)
     }

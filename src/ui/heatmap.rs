@@ -8,9 +8,10 @@ use std::sync::Arc;
 use egui::epaint::{Mesh, Tessellator};
 use egui::{Color32, Id, Pos2, Rect, Role, Sense, Shape, Stroke, StrokeKind, Ui, Vec2, WidgetInfo, pos2, vec2};
 
-use super::theme::{self, Palette};
+use super::theme::Palette;
 use crate::lab::PolicyView;
-use crate::mdp::{Action, CAP, Grid};
+use crate::mdp::{Action, Grid};
+use crate::picture::COLOR_MAPS;
 
 /// Pictures of the last frame, by panel.
 #[derive(Default)]
@@ -24,6 +25,7 @@ struct Key {
     version: u64,
     rect: Rect,
     is_dark: bool,
+    color_map: usize,
     pixels_per_point: f32,
 }
 
@@ -41,6 +43,8 @@ pub struct Heatmap<'a> {
     pub marked: Option<usize>,
     /// Cells with a reward of their own, r̃: it is written there.
     pub rewards: &'a [(usize, f64)],
+    /// Place in [`COLOR_MAPS`].
+    pub color_map: usize,
 }
 
 impl Heatmap<'_> {
@@ -50,7 +54,8 @@ impl Heatmap<'_> {
         response.widget_info(|| WidgetInfo::labeled(Role::Image, true, self.name));
         let cell = rect.size() / vec2(self.grid.cols() as f32, self.grid.rows() as f32);
         let pixels_per_point = ui.ctx().pixels_per_point();
-        let key = Key { version: self.version, rect, is_dark: ui.visuals().dark_mode, pixels_per_point };
+        let Heatmap { version, color_map, .. } = self;
+        let key = Key { version, rect, is_dark: ui.visuals().dark_mode, color_map, pixels_per_point };
         let kept = pictures.kept.get(&response.id).filter(|(old, _)| *old == key);
         let picture = kept.map(|(_, mesh)| mesh.clone()).unwrap_or_else(|| {
             let mesh = Arc::new(self.tessellate(ui, rect, cell));
@@ -97,16 +102,19 @@ impl Heatmap<'_> {
         // The ground shows between cells as a thin line, where there is room for one.
         add(Shape::rect_filled(rect, 0.0, palette.ground));
         let gap = if cell.x >= 12.0 { 0.5 } else { 0.0 };
+        let colors = &COLOR_MAPS[self.color_map];
         for state in 0..self.grid.cells() {
             let place = self.cell_rect(rect, cell, state).shrink(gap);
             if self.grid.is_wall(state) {
                 add(Shape::rect_filled(place, 0.0, palette.wall));
+                // Struck through: no colour map may take a wall for a cell.
+                let across = [place.left_bottom(), place.right_top()];
+                add(Shape::line_segment(across, Stroke::new((0.05 * cell.x).max(0.7), palette.muted)));
                 continue;
             }
-            let capped = (self.policy.hitting_time[state] / CAP as f32).min(1.0);
-            let color = theme::viridis(1.0 - capped);
-            add(Shape::rect_filled(place, 0.0, color));
-            let ink = theme::ink_on(color);
+            let color = colors.of_steps(f64::from(self.policy.hitting_time[state]));
+            add(Shape::rect_filled(place, 0.0, rgb(color)));
+            let ink = rgb(colors.ink_on(color));
             if state == self.grid.goal() {
                 flag(place, ink).into_iter().for_each(&mut add);
             } else {
@@ -155,8 +163,12 @@ pub fn flag(cell: Rect, ink: Color32) -> Vec<Shape> {
     ]
 }
 
-/// The scale of the heatmaps' colours, with its ends and what it measures.
-pub fn color_bar(ui: &mut Ui) {
+fn rgb([r, g, b]: [u8; 3]) -> Color32 {
+    Color32::from_rgb(r, g, b)
+}
+
+/// The scale of the heatmaps' colours, with its ends and what it measures. `color_map`: place in [`COLOR_MAPS`].
+pub fn color_bar(ui: &mut Ui, color_map: usize) {
     let palette = Palette::of(ui);
     let text = |ui: &mut Ui, words: &str| {
         ui.label(egui::RichText::new(words).small().color(palette.muted));
@@ -171,8 +183,9 @@ pub fn color_bar(ui: &mut Ui) {
         for i in 0..=STOPS {
             let t = i as f32 / STOPS as f32;
             let x = egui::lerp(rect.x_range(), t);
-            mesh.colored_vertex(pos2(x, rect.top()), theme::viridis(t));
-            mesh.colored_vertex(pos2(x, rect.bottom()), theme::viridis(t));
+            let color = rgb((COLOR_MAPS[color_map].color)(f64::from(t)));
+            mesh.colored_vertex(pos2(x, rect.top()), color);
+            mesh.colored_vertex(pos2(x, rect.bottom()), color);
             if i > 0 {
                 let first = 2 * i - 2;
                 mesh.add_triangle(first, first + 1, first + 2);

@@ -9,6 +9,15 @@ pub trait Host {
     /// Gives a text to the visitor as a file; the error is a sentence.
     fn save(&mut self, name: &str, text: &str) -> Result<(), String>;
 
+    /// Gives a picture, an SVG document, to the visitor as PNG with two pixels for one. The error is a sentence;
+    /// what fails only later is told by [`Host::failure`].
+    fn save_picture(&mut self, name: &str, svg: &str) -> Result<(), String>;
+
+    /// A sentence about something that had been begun and has failed since.
+    fn failure(&mut self) -> Option<String> {
+        None
+    }
+
     /// Asks the visitor for a file; [`Host::opened`] has it later. The error is a sentence.
     fn ask_for_file(&mut self) -> Result<(), String>;
 

@@ -2,7 +2,7 @@
 //!
 //! - [`App`] (app.rs): what the page knows, what it hears and what it asks for.
 //! - toolbar, headline, controls, board (panels, chart, inspector), help: the parts of the page.
-//! - experiments: the tabs beside training. host: files, which a browser and a window give in different ways.
+//! - experiments: the tabs beside training. export: pictures, curve and model as texts. host: files, which a browser and a window give in different ways.
 //! - heatmap: one policy on one grid. chart, table: figures over figures. theme: every colour, font and distance. numbers: how they are written.
 //!   widgets: small pieces that several parts use. focus: the ring around what the keyboard acts on.
 
@@ -14,6 +14,7 @@ mod commands;
 mod compare;
 mod controls;
 mod experiments;
+mod export;
 mod focus;
 mod headline;
 mod heatmap;

@@ -24,6 +24,30 @@ pub struct Panel<'a> {
     pub waiting: String,
 }
 
+impl Panel<'_> {
+    /// Whether it shows a clone with a memory, which is as at the start of an episode.
+    fn remembers(&self, view: &View) -> bool {
+        self.clone.is_some_and(|(index, _)| view.clones[index].model().remembers)
+    }
+
+    /// The line under its title: the chosen return and how many arrive, or what is being waited for.
+    pub fn figures(&self, view: &View) -> String {
+        let kind = &RETURN_KINDS[view.kind];
+        let text = match self.policy.map(|policy| &policy.returns) {
+            None => self.waiting.clone(),
+            Some(returns) => {
+                let arrive = format!("{} arrive", numbers::percent(returns.success));
+                match returns.get(view.kind) {
+                    _ if !kind.is_steps => arrive,
+                    Some(value) => format!("{} steps, {arrive}", numbers::steps(value)),
+                    None => format!("{} in T, {arrive}", numbers::steps(returns.horizon_return)),
+                }
+            }
+        };
+        if self.remembers(view) { format!("start: {text}") } else { text }
+    }
+}
+
 /// All panels, in order.
 pub fn list<'a>(started: &'a Started, snapshot: &'a Snapshot, view: &View) -> Vec<Panel<'a>> {
     let experts = snapshot.experts.iter().enumerate().map(|(index, policy)| Panel {
@@ -181,7 +205,8 @@ pub fn show(
             let id = egui::Id::unique(("heatmap", &panel.title));
             let name = describe(&panel.title, policy);
             let rewards = if panel.clone.is_some() { rewards } else { &[] };
-            let heatmap = Heatmap { id, name: &name, grid, policy, version, marked: view.cell, rewards };
+            let View { cell: marked, color_map, .. } = *view;
+            let heatmap = Heatmap { id, name: &name, grid, policy, version, marked, rewards, color_map };
             let cell = heatmap.show(ui, picture, pictures);
             touched.cell = touched.cell.or(cell);
         }
@@ -237,20 +262,8 @@ fn show_title(ui: &mut Ui, panel: &Panel, height: f32, view: &View, touched: &mu
             }
         }
     });
-    let kind = &RETURN_KINDS[view.kind];
-    let remembers = panel.clone.is_some_and(|(index, _)| view.clones[index].model().remembers);
-    let text = match panel.policy.map(|policy| &policy.returns) {
-        None => panel.waiting.clone(),
-        Some(returns) => {
-            let arrive = format!("{} arrive", numbers::percent(returns.success));
-            match returns.get(view.kind) {
-                _ if !kind.is_steps => arrive,
-                Some(value) => format!("{} steps, {arrive}", numbers::steps(value)),
-                None => format!("{} in T, {arrive}", numbers::steps(returns.horizon_return)),
-            }
-        }
-    };
-    let text = if remembers { format!("start: {text}") } else { text };
+    let remembers = panel.remembers(view);
+    let text = panel.figures(view);
     ui.allocate_ui_with_layout(vec2(line.x, 20.0), Layout::left_to_right(Align::Center), |ui| {
         let label = ui.add(egui::Label::new(RichText::new(text).small().color(palette.muted)).truncate());
         if remembers {

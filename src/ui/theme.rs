@@ -117,17 +117,6 @@ pub fn semibold() -> FontFamily {
     FontFamily::Name("semibold".into())
 }
 
-/// Viridis, from −100 (0) to 0 (1), as the paper's figures have it.
-pub fn viridis(t: f32) -> Color32 {
-    let color = colorous::VIRIDIS.eval_continuous(f64::from(t.clamp(0.0, 1.0)));
-    Color32::from_rgb(color.r, color.g, color.b)
-}
-
-/// Ink that can be read on a colour.
-pub fn ink_on(color: Color32) -> Color32 {
-    if color.intensity() > 0.45 { Color32::from_rgb(0x10, 0x12, 0x16) } else { Color32::from_rgb(0xfa, 0xfa, 0xfa) }
-}
-
 /// Gives a context our fonts and styles, light and dark.
 pub fn install(ctx: &Context) {
     let mut fonts = FontDefinitions::empty();

@@ -1,14 +1,18 @@
-//! What a browser gives the page: downloads, a file picker, files dropped on it, and storage.
+//! What a browser gives the page: downloads, pictures drawn by the browser itself, a file picker, files dropped on it, and
+//! storage.
 
 use std::cell::RefCell;
 use std::collections::VecDeque;
 use std::rc::Rc;
 
 use egui::DroppedFileHandle;
-use js_sys::Array;
+use js_sys::{Array, Promise};
 use wasm_bindgen::prelude::*;
 use wasm_bindgen_futures::{JsFuture, spawn_local};
-use web_sys::{Blob, File, HtmlAnchorElement, HtmlInputElement, Url};
+use web_sys::{
+    Blob, BlobPropertyBag, CanvasRenderingContext2d, File, HtmlAnchorElement, HtmlCanvasElement, HtmlImageElement,
+    HtmlInputElement, Url,
+};
 
 use super::place::Place;
 use crate::ui::{Host, check_length};
@@ -19,15 +23,17 @@ type Inbox = Rc<RefCell<VecDeque<(String, Result<String, String>)>>>;
 pub struct Files {
     wake: Rc<dyn Fn()>,
     inbox: Inbox,
+    failures: Rc<RefCell<VecDeque<String>>>,
     picker: Option<(HtmlInputElement, Closure<dyn Fn()>)>,
     place: Place,
 }
 
 impl Files {
-    /// `wake` is called when a file has been read.
+    /// `wake` is called when a file has been read, and when something has failed.
     pub fn new(wake: impl Fn() + 'static) -> Files {
         let wake: Rc<dyn Fn()> = Rc::new(wake);
-        Files { place: Place::new(wake.clone()), wake, inbox: Inbox::default(), picker: None }
+        let place = Place::new(wake.clone());
+        Files { place, wake, inbox: Inbox::default(), failures: Rc::default(), picker: None }
     }
 
     fn pick(&mut self) -> Result<(), JsValue> {
@@ -52,6 +58,28 @@ impl Files {
 impl Host for Files {
     fn save(&mut self, name: &str, text: &str) -> Result<(), String> {
         download(name, text).map_err(|error| format!("{name} could not be saved ({error:?})."))
+    }
+
+    fn save_picture(&mut self, name: &str, svg: &str) -> Result<(), String> {
+        let (name, svg) = (name.to_owned(), svg.to_owned());
+        let (failures, wake) = (self.failures.clone(), self.wake.clone());
+        spawn_local(async move {
+            let saved = match rasterize(&svg).await {
+                Ok(png) => offer(&name, &png),
+                Err(error) => Err(error),
+            };
+            if let Err(error) = saved {
+                failures
+                    .borrow_mut()
+                    .push_back(format!("{name} could not be drawn ({error:?}); SVG needs no drawing."));
+                wake();
+            }
+        });
+        Ok(())
+    }
+
+    fn failure(&mut self) -> Option<String> {
+        self.failures.borrow_mut().pop_front()
     }
 
     fn ask_for_file(&mut self) -> Result<(), String> {
@@ -120,12 +148,49 @@ fn take(file: File, inbox: Inbox, wake: Rc<dyn Fn()>) {
 }
 
 fn download(name: &str, text: &str) -> Result<(), JsValue> {
+    offer(name, &Blob::new_with_str_sequence(&Array::of1(&text.into()))?)
+}
+
+fn offer(name: &str, blob: &Blob) -> Result<(), JsValue> {
     let document = web_sys::window().and_then(|window| window.document()).ok_or("no document")?;
-    let blob = Blob::new_with_str_sequence(&Array::of1(&text.into()))?;
-    let address = Url::create_object_url_with_blob(&blob)?;
+    let address = Url::create_object_url_with_blob(blob)?;
     let link: HtmlAnchorElement = document.create_element("a")?.unchecked_into();
     link.set_href(&address);
     link.set_download(name);
     link.click();
     Url::revoke_object_url(&address)
+}
+
+/// An SVG document as PNG, two pixels for one.
+async fn rasterize(svg: &str) -> Result<Blob, JsValue> {
+    const SCALE: u32 = 2;
+    let document = web_sys::window().and_then(|window| window.document()).ok_or("no document")?;
+    let options = BlobPropertyBag::new();
+    options.set_type("image/svg+xml");
+    let blob = Blob::new_with_str_sequence_and_options(&Array::of1(&svg.into()), &options)?;
+    let address = Url::create_object_url_with_blob(&blob)?;
+    let image = HtmlImageElement::new()?;
+    let loaded = Promise::new(&mut |resolve, reject| {
+        image.set_onload(Some(&resolve));
+        // The event that comes says nothing.
+        image.set_onerror(Some(&reject.bind1(&JsValue::UNDEFINED, &"the browser does not take the picture".into())));
+    });
+    image.set_src(&address);
+    let loaded = JsFuture::from(loaded).await;
+    Url::revoke_object_url(&address)?;
+    loaded?;
+    let (width, height) = (SCALE * image.natural_width(), SCALE * image.natural_height());
+    let canvas: HtmlCanvasElement = document.create_element("canvas")?.unchecked_into();
+    canvas.set_width(width);
+    canvas.set_height(height);
+    let context: CanvasRenderingContext2d = canvas.get_context("2d")?.ok_or("no canvas to draw on")?.unchecked_into();
+    context.draw_image_with_html_image_element_and_dw_and_dh(&image, 0.0, 0.0, f64::from(width), f64::from(height))?;
+    let drawn = Promise::new(&mut |resolve, reject| {
+        if let Err(error) = canvas.to_blob(&resolve) {
+            // Nobody waits for more than one answer.
+            let _ = reject.call1(&JsValue::UNDEFINED, &error);
+        }
+    });
+    // A canvas that is too large gives nothing.
+    JsFuture::from(drawn).await?.dyn_into().map_err(|_| "the picture is too large".into())
 }

@@ -1,4 +1,4 @@
-//! The command line: `ape evaluate`, `train` and `presets` here, `attack`, `table1`, `sweep` and `results` in
+//! The command line: `ape evaluate`, `train`, `model` and `presets` here, `attack`, `table1`, `sweep` and `results` in
 //! `experiments`.
 //!
 //! Results go to standard output. Bad input gets one line on standard error and exit code 2.
@@ -16,7 +16,7 @@ use std::process::ExitCode;
 
 use ape_lab::ape::{Ensemble, EnsembleFile, FIELDS, Field, Figures, Trainer};
 use ape_lab::experiment::{CurvePoint, Denied, PRESETS, Preset, Setup};
-use ape_lab::mdp::{Grid, HORIZON, KnownReturns};
+use ape_lab::mdp::{Grid, HORIZON, KnownReturns, transition_model};
 use clap::{Arg, ArgMatches, Command};
 use serde::Serialize;
 
@@ -32,6 +32,7 @@ fn main() -> ExitCode {
     let outcome = match matches.subcommand() {
         Some(("evaluate", matches)) => evaluate(matches),
         Some(("train", matches)) => train(matches),
+        Some(("model", matches)) => model(matches),
         Some(("attack", matches)) => experiments::attack(matches),
         Some(("table1", matches)) => experiments::table1(matches),
         Some(("sweep", matches)) => experiments::sweep(matches),
@@ -63,6 +64,10 @@ fn command() -> Command {
         .about("Train an ensemble; prints its figures as JSON")
         .arg(file("out", "Write the ensemble to this file"))
         .arg(file("curve", "Write the figures after every update to this CSV file"));
+    let model = Command::new("model")
+        .about("The transition model of a grid, for Python: states, actions, P, as Gymnasium has them")
+        .arg(file("out", "Write it to this file instead of standard output"));
+    let fields = FIELDS.each_ref().map(|field| field.name);
     let mut command = Command::new("ape")
         .about("Adversarial policy ensembles: train them, evaluate them, attack them")
         .version(env!("CARGO_PKG_VERSION"))
@@ -72,7 +77,8 @@ fn command() -> Command {
                 .about("Exact figures of an ensemble file, as JSON")
                 .arg(Arg::new("file").value_name("FILE").required(true)),
         )
-        .subcommand(with_setup(train, &[]));
+        .subcommand(with_setup(train, &[]))
+        .subcommand(with_setup(model, &fields));
     for experiment in experiments::commands() {
         command = command.subcommand(experiment);
     }
@@ -166,18 +172,37 @@ fn presets() -> Result<(), String> {
     Ok(())
 }
 
-/// The setup that the flags describe: a preset or a file, then single fields.
-fn setup(matches: &ArgMatches) -> Result<Setup, String> {
+fn model(matches: &ArgMatches) -> Result<(), String> {
+    check_out(matches, "out")?;
+    let grid = Grid::new(start(matches)?.grid).map_err(|error| error.to_string())?;
+    let text = serde_json::to_string(&transition_model(&grid)).map_err(|error| error.to_string())?;
+    match matches.get_one::<String>("out") {
+        Some(file) => write(file, &(text + "\n")),
+        None => {
+            say!("{text}");
+            Ok(())
+        }
+    }
+}
+
+/// What the flags say to start from: a preset or a file.
+fn start(matches: &ArgMatches) -> Result<Setup, String> {
     let text = |name: &str| matches.get_one::<String>(name);
-    let mut setup = match (text("preset"), text("config")) {
-        (Some(_), Some(_)) => return Err("--preset and --config: give one of them, both say where to start".to_owned()),
-        (None, Some(file)) => Setup::parse(&read(file)?).map_err(|error| format!("{file}: {error}"))?,
+    match (text("preset"), text("config")) {
+        (Some(_), Some(_)) => Err("--preset and --config: give one of them, both say where to start".to_owned()),
+        (None, Some(file)) => Setup::parse(&read(file)?).map_err(|error| format!("{file}: {error}")),
         (Some(name), None) => {
             let known = || PRESETS.iter().map(|preset| preset.name).collect::<Vec<_>>().join(", ");
-            (Preset::find(name).ok_or_else(|| format!("--preset {name}: must be one of {}", known()))?.setup)()
+            let preset = Preset::find(name).ok_or_else(|| format!("--preset {name}: must be one of {}", known()))?;
+            Ok((preset.setup)())
         }
-        (None, None) => (PRESETS[0].setup)(),
-    };
+        (None, None) => Ok((PRESETS[0].setup)()),
+    }
+}
+
+/// The setup to train: what the flags say to start from, then single fields.
+fn setup(matches: &ArgMatches) -> Result<Setup, String> {
+    let mut setup = start(matches)?;
     if setup.ensemble.is_some() {
         return Err("this preset is a given ensemble: there is nothing to train".to_owned());
     }

@@ -2,23 +2,29 @@
 
 use std::collections::BTreeMap;
 
-use super::{BOLD, QUIET, document, hex, list, n, path, text};
+use super::{BOLD, ColorMap, QUIET, document, hex, list, n, path, text, wrap};
 use crate::mdp::{ACTIONS, Action, CAP, Grid, Policy};
 
 const MARGIN: f64 = 16.0;
 
+/// Height of a line of the caption.
+const LINE: f64 = 17.0;
+
 /// One heat map.
-pub struct Panel<'a> {
+pub struct Panel {
     pub title: String,
     pub subtitle: String,
-    pub policy: &'a Policy,
+    pub policy: Policy,
     /// Expected steps to the goal, `[S]`.
-    pub steps: &'a [f64],
+    pub steps: Vec<f64>,
+    /// Cells with a reward of their own, r̃, which is not 0: they are framed, white for a loss, black for a gain.
+    pub rewards: Vec<(usize, f64)>,
 }
 
 /// Heat maps side by side, three a row. The colour of a cell is its steps to the goal, cut at 100; the length
-/// of an arrow is the probability of its move, the radius of a dot that of Stay.
-pub fn heatmaps(grid: &Grid, panels: &[Panel]) -> String {
+/// of an arrow is the probability of its move, the radius of a dot that of Stay. Below them the colours' scale, and
+/// the paragraphs of `caption`, each in as many lines as it takes.
+pub fn heatmaps(grid: &Grid, panels: &[Panel], colors: &ColorMap, caption: &[String]) -> String {
     const SIDE: f64 = 240.0;
     const GAP: f64 = 24.0;
     const PER_ROW: usize = 3;
@@ -31,33 +37,47 @@ pub fn heatmaps(grid: &Grid, panels: &[Panel]) -> String {
         let y = MARGIN + (i / PER_ROW) as f64 * pitch;
         body += &text(x, y + 10.0, BOLD, &panel.title, SIDE);
         body += &text(x, y + 26.0, QUIET, &panel.subtitle, SIDE);
-        body += &format!("<g transform=\"translate({})\">{}</g>\n", list(&[x, y + head]), heatmap(grid, panel, cell));
+        body += &format!(
+            "<g transform=\"translate({})\">{}</g>\n",
+            list(&[x, y + head]),
+            heatmap(grid, panel, colors, cell)
+        );
     }
     let bar = MARGIN + panels.len().div_ceil(PER_ROW) as f64 * pitch;
-    let tenth = |i| format!("<stop offset=\".{i}\" stop-color=\"{}\"/>", hex(viridis(f64::from(i) * CAP / 9.0)));
+    let tenth =
+        |i| format!("<stop offset=\".{i}\" stop-color=\"{}\"/>", hex(colors.of_steps(f64::from(i) * CAP / 9.0)));
     let stops: String = (0..10).map(tenth).collect();
     body += &format!("<linearGradient id=\"steps\" x2=\"1.11\">{stops}</linearGradient>");
     body += &format!("<path fill=\"url(#steps)\" d=\"M30 {}h120v12h-120z\"/>", n(bar - 10.0));
     body += &text(MARGIN, bar, QUIET, "0", SIDE);
     body += &text(156.0, bar, QUIET, &format!("{CAP} or more steps to the goal"), SIDE);
     let width = 2.0 * MARGIN + panels.len().clamp(1, PER_ROW) as f64 * (SIDE + GAP) - GAP;
-    document(width.max(380.0), bar + MARGIN, &body)
+    let width = width.max(380.0);
+    let mut bottom = bar;
+    for paragraph in caption {
+        bottom += 0.4 * LINE;
+        for line in wrap(paragraph, width - 2.0 * MARGIN) {
+            bottom += LINE;
+            body += &text(MARGIN, bottom, "", &line, width - 2.0 * MARGIN);
+        }
+    }
+    document(width, bottom + MARGIN, &body)
 }
 
 /// Cells of one colour are one path, as are the arrows of one ink: that keeps the file small.
-fn heatmap(grid: &Grid, panel: &Panel, cell: f64) -> String {
+fn heatmap(grid: &Grid, panel: &Panel, colors: &ColorMap, cell: f64) -> String {
     const WALL: [u8; 3] = [0x9a, 0x9f, 0xa8];
     let mut fills = BTreeMap::<[u8; 3], String>::new();
-    let mut inks = BTreeMap::<&str, String>::new();
+    let mut inks = BTreeMap::<[u8; 3], String>::new();
     let stroke = (0.05 * cell).max(0.7);
     for state in 0..grid.cells() {
         let (row, col) = grid.cell(state);
         let (x, y) = (f64::from(col) * cell, (f64::from(row) + 0.5) * cell);
-        let color = if grid.is_wall(state) { WALL } else { viridis(panel.steps[state]) };
+        let color = if grid.is_wall(state) { WALL } else { colors.of_steps(panel.steps[state]) };
         *fills.entry(color).or_default() += &format!("M{}h{}", list(&[x, y]), n(cell));
         if !grid.is_wall(state) && state != grid.goal() {
             let arrows = arrows(x + cell / 2.0, y, cell, panel.policy.row(state), stroke);
-            *inks.entry(ink_on(color)).or_default() += &arrows;
+            *inks.entry(colors.ink_on(color)).or_default() += &arrows;
         }
     }
     let mut map = format!("<g stroke-width=\"{}\" shape-rendering=\"crispEdges\">", n(cell));
@@ -72,14 +92,34 @@ fn heatmap(grid: &Grid, panel: &Panel, cell: f64) -> String {
         let down = (1..grid.cols()).map(|col| format!("M{} 0v{height}", n(col as f64 * cell)));
         map += &format!("<path stroke=\"#fff\" d=\"{}\"/>", across.chain(down).collect::<String>());
     }
+    // Walls are struck through: no colour map may take them for cells.
+    let walls = (0..grid.cells()).filter(|&state| grid.is_wall(state)).map(|wall| {
+        let (row, col) = grid.cell(wall);
+        let corner = [f64::from(col) * cell, f64::from(row + 1) * cell];
+        format!("M{}l{}", list(&corner), list(&[cell, -cell]))
+    });
+    let walls: String = walls.collect();
+    if !walls.is_empty() {
+        let width = n(stroke);
+        map += &format!("<path class=\"walls\" stroke=\"#5f656f\" stroke-width=\"{width}\" d=\"{walls}\"/>");
+    }
     for (ink, arrows) in inks {
+        let ink = hex(ink);
         let style = format!("fill=\"{ink}\" stroke=\"{ink}\" stroke-width=\"{}\"", n(stroke));
         map += &format!("<path {style} stroke-linejoin=\"round\" d=\"{arrows}\"/>");
+    }
+    for &(state, reward) in &panel.rewards {
+        let (row, col) = grid.cell(state);
+        let corner = [f64::from(col) * cell + stroke, f64::from(row) * cell + stroke];
+        let (side, width) = (n(cell - 2.0 * stroke), n(1.5 * stroke));
+        let style = format!("stroke=\"{}\" stroke-width=\"{width}\"", if reward < 0.0 { "#fff" } else { "#000" });
+        let frame = format!("M{}h{side}v{side}h-{side}z", list(&corner));
+        map += &format!("<path class=\"reward\" fill=\"none\" {style} d=\"{frame}\"/>");
     }
     let (row, col) = grid.cell(grid.goal());
     let at = |(x, y): (f64, f64)| ((f64::from(col) + x) * cell, (f64::from(row) + y) * cell);
     let flag = [(0.28, 0.84), (0.28, 0.16), (0.8, 0.34), (0.37, 0.53), (0.37, 0.84)].map(at);
-    let ink = ink_on(viridis(panel.steps[grid.goal()]));
+    let ink = hex(colors.ink_on(colors.of_steps(panel.steps[grid.goal()])));
     map + &format!("<path class=\"goal\" fill=\"{ink}\" d=\"{}z\"/>", path(&flag))
 }
 
@@ -110,34 +150,54 @@ fn arrows(x: f64, y: f64, cell: f64, row: &[f64; ACTIONS], stroke: f64) -> Strin
     arrows
 }
 
-/// Yellow at the goal, purple from 100 steps on.
-fn viridis(steps: f64) -> [u8; 3] {
-    let color = colorous::VIRIDIS.eval_continuous(1.0 - (steps / CAP).clamp(0.0, 1.0));
-    [color.r, color.g, color.b]
-}
-
-/// Ink that can be read on a colour.
-fn ink_on([r, g, b]: [u8; 3]) -> &'static str {
-    let intensity = 0.299 * f64::from(r) + 0.587 * f64::from(g) + 0.114 * f64::from(b);
-    if intensity > 0.45 * 255.0 { "#101216" } else { "#fafafa" }
-}
-
 #[cfg(test)]
 mod tests {
-    use super::super::assert_well_formed;
+    use super::super::{COLOR_MAPS, assert_well_formed};
     use super::*;
     use crate::mdp::{GridSpec, HORIZON, Solver, optimal_policy};
+
+    fn panel(grid: &Grid) -> Panel {
+        let policy = optimal_policy(grid);
+        let steps = Solver::new(grid).evaluate(&policy, HORIZON).hitting_time;
+        Panel { title: "a < b & c > d".into(), subtitle: "".into(), policy, steps, rewards: Vec::new() }
+    }
 
     #[test]
     fn heatmaps_have_a_flag_each_and_escaped_titles() {
         let grid = Grid::new(GridSpec { walls: vec![(1, 1), (2, 1)], slip: 0.1, ..GridSpec::default() }).unwrap();
-        let policy = optimal_policy(&grid);
-        let steps = Solver::new(&grid).evaluate(&policy, HORIZON).hitting_time;
-        let panel = || Panel { title: "a < b & c > d".into(), subtitle: "".into(), policy: &policy, steps: &steps };
-        let svg = heatmaps(&grid, &[panel(), panel(), panel(), panel(), panel()]);
+        let panels: Vec<Panel> = (0..5).map(|_| panel(&grid)).collect();
+        let svg = heatmaps(&grid, &panels, &COLOR_MAPS[0], &[]);
         assert_well_formed(&svg);
         assert_eq!(svg.matches("class=\"goal\"").count(), 5);
+        assert_eq!(svg.matches("class=\"walls\"").count(), 5);
         assert_eq!(svg.matches(">a &lt; b &amp; c &gt; d<").count(), 5);
         assert!(svg.len() < 60_000, "{}", svg.len());
+    }
+
+    /// The caption stands below everything else and inside the picture, every word of it, in lines that fit.
+    #[test]
+    fn a_caption_is_wrapped_below_the_scale() {
+        let grid = Grid::new(GridSpec { rows: 3, cols: 20, ..GridSpec::default() }).unwrap();
+        let words: Vec<String> = (0..80).map(|i| format!("word{i}")).collect();
+        let caption = [words.join(" "), "last".to_owned()];
+        let with = |colors| heatmaps(&grid, &[Panel { rewards: vec![(5, -1.0)], ..panel(&grid) }], colors, &caption);
+        let [svg, contrast] = [with(&COLOR_MAPS[0]), with(&COLOR_MAPS[2])];
+        for svg in [&svg, &contrast] {
+            assert_well_formed(svg);
+            assert!(!svg.contains("textLength") && svg.contains("class=\"reward\""));
+        }
+        let number = |tag: &str, name: &str| -> f64 {
+            tag.split_once(&format!("{name}=\"")).unwrap().1.split('"').next().unwrap().parse().unwrap()
+        };
+        let lines: Vec<(f64, &str)> = svg.split("<text ").skip(1).map(|tag| (number(tag, " y"), tag)).collect();
+        let scale = lines.iter().position(|(_, tag)| tag.contains("or more steps")).unwrap();
+        let (above, below) = lines.split_at(scale + 1);
+        assert!(below.len() > 5 && below[0].0 > above[scale].0);
+        assert!(below.windows(2).all(|pair| pair[1].0 - pair[0].0 >= LINE));
+        assert!(below.last().unwrap().0 < number(&svg, " height") && below.last().unwrap().1.contains(">last<"));
+        assert!(words.iter().all(|word| svg.contains(word)));
+        // Greys only: red, green and blue are equal.
+        let is_grey = |hex: &str| hex[0..2] == hex[2..4] && hex[2..4] == hex[4..6];
+        assert!(contrast.split("stop-color=\"#").skip(1).all(|rest| is_grey(&rest[..6])));
     }
 }

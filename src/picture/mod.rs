@@ -1,12 +1,15 @@
-//! Pictures for papers and READMEs, as SVG text: heat maps of policies, and charts.
+//! Pictures for papers and READMEs, as SVG text: heat maps of policies, and charts; and the colours of heat maps,
+//! which the page shares.
 //!
 //! White ground, vectors only, 12 px text; the same input gives the same bytes. Lengths are in px. Here is what
 //! the pictures share: how numbers, paths, words and the whole document are written.
 
 mod chart;
+mod colors;
 mod heatmaps;
 
 pub use chart::{Axes, Mark, Series, chart};
+pub use colors::{COLOR_MAPS, ColorMap};
 pub use heatmaps::{Panel, heatmaps};
 
 const BOLD: &str = " font-weight=\"600\"";
@@ -34,6 +37,18 @@ fn text(x: f64, y: f64, style: &str, words: &str, room: f64) -> String {
     let fit = if wide(words) > room { &squeezed } else { "" };
     let words = words.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;");
     format!("<text x=\"{}\" y=\"{}\"{style}{fit}>{words}</text>\n", n(x), n(y))
+}
+
+/// Words in lines no wider than `room`; a word that is wider has a line of its own.
+fn wrap(words: &str, room: f64) -> Vec<String> {
+    let mut lines: Vec<String> = Vec::new();
+    for word in words.split_whitespace() {
+        match lines.last_mut() {
+            Some(line) if wide(line) + wide(" ") + wide(word) <= room => *line += &format!(" {word}"),
+            _ => lines.push(word.to_owned()),
+        }
+    }
+    lines
 }
 
 fn document(width: f64, height: f64, body: &str) -> String {
