@@ -2,12 +2,14 @@
 //!
 //! Everything here is exact or a single draw; nothing learns and nothing knows of ensembles.
 
+mod arrival;
 mod grid;
 mod optimal;
 mod policy;
 mod returns;
 mod rollout;
 
+pub use arrival::Arrivals;
 pub use grid::{Action, Cell, Grid, GridError, GridSpec};
 pub use optimal::optimal_policy;
 pub use policy::{Policy, PolicyError};
