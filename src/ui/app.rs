@@ -4,6 +4,7 @@ use egui::{CentralPanel, Frame, Margin, RichText, ScrollArea, Ui};
 
 use super::board::Shown;
 use super::experiments::bench::BenchTab;
+use super::experiments::race::RaceTab;
 use super::experiments::sweep::SweepTab;
 use super::experiments::table1::Table1Tab;
 use super::heatmap::{self, Pictures};
@@ -33,6 +34,7 @@ pub enum BetaMode {
 #[derive(Clone, Copy, PartialEq)]
 pub enum Tab {
     Train,
+    Race,
     Sweep,
     Bench,
     Table1,
@@ -43,6 +45,8 @@ pub enum Tab {
 pub enum Wanted {
     /// Attack it on the bench.
     Bench,
+    /// Race it.
+    Race,
     /// Give it to the visitor as a file.
     Save,
     /// Make the clones that are not quick.
@@ -93,6 +97,7 @@ pub struct App {
     pub pool: Pool,
     host: Box<dyn Host>,
     bench: BenchTab,
+    race: RaceTab,
     table1: Table1Tab,
     sweep: SweepTab,
     /// What the next ensembles from the session are for.
@@ -136,6 +141,7 @@ impl App {
             pool,
             host,
             bench: BenchTab::default(),
+            race: RaceTab::default(),
             table1: Table1Tab::default(),
             sweep: SweepTab::default(),
             wanted: Vec::new(),
@@ -312,6 +318,7 @@ impl App {
         for (id, event) in self.pool.receive() {
             let batches = [&mut self.bench.batch, &mut self.table1.batch, &mut self.sweep.batch];
             batches.into_iter().flatten().for_each(|batch| batch.hear(id, &event, self.now));
+            self.race.hear(id, &event, self.now);
             self.take_clone(id, event);
         }
         while let Some((name, text)) = self.host.opened() {
@@ -327,6 +334,11 @@ impl App {
                     let mut bench = std::mem::take(&mut self.bench);
                     bench.attack(exported.clone(), self, self.now);
                     self.bench = bench;
+                }
+                Wanted::Race => {
+                    let mut race = std::mem::take(&mut self.race);
+                    race.begin(exported.clone(), self, self.now);
+                    self.race = race;
                 }
                 Wanted::Save => {
                     if let Ok(text) = serde_json::to_string(&exported.file) {
@@ -543,6 +555,7 @@ impl App {
     fn show_tab(&mut self, ui: &mut Ui, draw: fn(&Shown, &mut Ui, &View, &mut Pictures) -> Touched) {
         let options = [
             (Tab::Train, "Train", "Policies and their training, live"),
+            (Tab::Race, "Race", "An expert, the clone and the optimal policy from one cell"),
             (Tab::Sweep, "β sweep", "Whole runs for many β"),
             (Tab::Bench, "Attack bench", "Every cloner against the ensemble that is shown"),
             (Tab::Table1, "Table 1", "The paper's comparison, over seeds"),
@@ -563,6 +576,11 @@ impl App {
             ui.set_width(ui.available_width());
             let mut show = |ui: &mut Ui| match self.view.tab {
                 Tab::Train => {}
+                Tab::Race => {
+                    let mut tab = std::mem::take(&mut self.race);
+                    tab.show(ui, self);
+                    self.race = tab;
+                }
                 Tab::Sweep => {
                     let mut tab = std::mem::take(&mut self.sweep);
                     tab.show(ui, self);

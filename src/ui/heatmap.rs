@@ -146,7 +146,7 @@ fn arrows(cell: Rect, policy: &[f32; 5], ink: Color32) -> Vec<Shape> {
 }
 
 /// The goal: a flag.
-fn flag(cell: Rect, ink: Color32) -> Vec<Shape> {
+pub fn flag(cell: Rect, ink: Color32) -> Vec<Shape> {
     let at = |x: f32, y: f32| -> Pos2 { pos2(egui::lerp(cell.x_range(), x), egui::lerp(cell.y_range(), y)) };
     let pole = Stroke::new((cell.width() * 0.08).max(1.0), ink);
     vec![
