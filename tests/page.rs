@@ -523,3 +523,123 @@ fn the_algorithm_can_be_exact_and_brings_its_observer() {
     settle(&mut page);
     assert!(figure(&page, "Ensemble capped") > -13.5 && figure(&page, "Clone (uniform) capped") < -90.0);
 }
+
+/// The text that starts so.
+fn text(page: &Page, start: &str) -> String {
+    says(&page.get_by(|node| says(node).is_some_and(|text| text.starts_with(start))).accesskit_node()).unwrap()
+}
+
+/// Draws until the race on the board is over.
+fn finish(page: &mut Page) {
+    for _ in 0..100 {
+        page.step();
+        if page.query_by_label("Pause the race").is_none() {
+            return;
+        }
+    }
+    panic!("the race did not end");
+}
+
+#[test]
+fn a_race_runs_from_the_cell_that_was_chosen() {
+    let (mut page, _) = open(1280.0, 800.0);
+    go_to(&mut page, "Race");
+    text(&page, "Nobody has raced yet");
+    text(&page, "An expert, drawn anew");
+    press(&mut page, "Race");
+    page.get_by_role_and_label(Role::Button, "Pause the race");
+    finish(&mut page);
+    // From the far corner 18 steps are the fewest; the blind clone gets lost.
+    assert_eq!(text(&page, "Optimal: "), "Optimal: 18 steps, arrived");
+    assert_eq!(text(&page, "Clone (uniform): "), "Clone (uniform): lost: not there after 100 steps");
+    assert!(text(&page, "Expert ").ends_with("steps, arrived"));
+    page.get_by(|node| node.role() == Role::Label && says(node).as_deref() == Some("100 of 100"));
+
+    // Another start by keyboard, and by its own clone: the honest one arrives.
+    page.get_by_label_contains("start in row 9, column 9").focus();
+    page.run_steps(2);
+    for key in [egui::Key::ArrowUp, egui::Key::ArrowUp, egui::Key::ArrowUp, egui::Key::ArrowLeft] {
+        page.key_press(key);
+        page.run_steps(2);
+    }
+    page.get_by_label_contains("start in row 6, column 8");
+    text(&page, "Start: row 6, column 8");
+    page.get_by_role_and_label(Role::ComboBox, "Who clones in the race").click_accesskit();
+    page.run_steps(3);
+    page.get_by_role_and_label(Role::Button, "history: remembers its episode").click_accesskit();
+    page.run_steps(3);
+    press(&mut page, "Again with other luck");
+    finish(&mut page);
+    assert_eq!(text(&page, "Optimal: "), "Optimal: 14 steps, arrived");
+    assert!(text(&page, "Clone (history): ").ends_with("steps, arrived"));
+}
+
+#[test]
+fn a_thousand_races_agree_with_the_exact_figures() {
+    let (mut page, here) = open(1280.0, 800.0);
+    go_to(&mut page, "Race");
+    press(&mut page, "Race 1,000");
+    finish(&mut page);
+    let number = |text: &str| -> f64 {
+        let text = text.trim().trim_end_matches([' ', '%', ')']).trim_start_matches(['>', '<', ' ']);
+        text.parse().unwrap_or_else(|_| panic!("{text:?}"))
+    };
+    let root = page.root();
+    let sentences: Vec<String> = root
+        .children_recursive()
+        .filter_map(|node| says(&node.accesskit_node()))
+        .filter(|text| text.contains("are not there by T;"))
+        .collect();
+    assert_eq!(sentences.len(), 3, "{sentences:?}");
+    for sentence in &sentences {
+        let (arrive, steps) = sentence.split_once(';').unwrap();
+        let (sample, exact) = arrive.trim_start_matches("all experts: ").split_once("arrive (exact").unwrap();
+        let exact = exact.split_once(')').unwrap().0;
+        assert!((number(sample) - number(exact)).abs() < 5.0, "{sentence}");
+        let (sample, exact) = steps.split_once("steps (exact").unwrap();
+        assert!((number(sample) - number(exact)).abs() < 3.0, "{sentence}");
+    }
+    assert!(sentences[1].contains("0 % arrive") || sentences[1].contains("99"), "{}", sentences[1]);
+    assert_eq!(sentences[2], "100 % arrive (exact 100 %), 0 % are not there by T; 18.0 steps (exact 18.0)");
+    text(&page, "Bars: 1,000 episodes by their steps to the goal; lines: exact. uniform clone, from row 9, column 9");
+    // The page says so when its ensemble is another one than that which raced.
+    let old = "The ensemble on the page has changed since";
+    assert!(page.query_by_label_contains(old).is_none());
+    press(&mut page, "One update");
+    page.run_steps(8);
+    assert!(here.0.borrow().commands.contains(&Command::Step));
+    text(&page, old);
+}
+
+/// Where nothing may move, a race is over at once, and nothing asks for more frames.
+#[test]
+fn a_race_stands_still_where_nothing_may_move() {
+    let (mut page, _) = open(1280.0, 800.0);
+    page.ctx.all_styles_mut(|style| style.animation_time = 0.0);
+    go_to(&mut page, "Race");
+    press(&mut page, "Race");
+    assert_eq!(text(&page, "Optimal: "), "Optimal: 18 steps, arrived");
+    page.get_by_role_and_label(Role::Slider, "Step of the race");
+    page.run_steps(20);
+    assert!(!page.ctx.has_requested_repaint());
+}
+
+/// On a phone the board is as wide as the page, and nothing stands beyond it.
+#[test]
+fn the_race_fits_a_phone() {
+    for (width, height) in [(390.0, 844.0), (820.0, 1180.0), (1000.0, 700.0), (1280.0, 800.0)] {
+        let (mut page, _) = open(width, height);
+        go_to(&mut page, "Race");
+        press(&mut page, "Race 1,000");
+        finish(&mut page);
+        for node in page.root().children_recursive() {
+            let Some(bounds) = node.accesskit_node().bounding_box() else { continue };
+            let name = says(&node.accesskit_node()).unwrap_or_default();
+            if !name.is_empty() {
+                assert!(bounds.x0 >= -0.5 && bounds.x1 <= f64::from(width) + 0.5, "{width}: {name:?} {bounds:?}");
+            }
+        }
+        let board = page.get_by_label_contains("Race board").accesskit_node().bounding_box().unwrap();
+        assert!(board.x1 - board.x0 > if width < 720.0 { 330.0 } else { 0.3 * f64::from(width) }, "{width}: {board:?}");
+    }
+}

@@ -1,11 +1,12 @@
-//! Experiments: what a run starts from, the presets, the course of a run; the attack bench, Table 1 and the sweep
-//! over β, each a list of independent tasks.
+//! Experiments: what a run starts from, the presets, the course of a run; the attack bench, Table 1, the sweep
+//! over β and the race, each a list of independent tasks.
 
 pub mod address;
 mod baselines;
 mod bench;
 mod curve;
 mod presets;
+mod race;
 mod setup;
 mod statistics;
 mod sweep;
@@ -17,6 +18,7 @@ pub use baselines::{METHODS, Method, PaperRow};
 pub use bench::{Attack, Bench, ensemble_returns};
 pub use curve::{CurvePoint, Denied};
 pub use presets::{PRESETS, Preset};
+pub use race::{Figures, Race, RaceError, Raced, Racer, Run};
 pub use setup::{Course, Setup, SetupError};
 pub use statistics::Summary;
 pub use sweep::{Sweep, SweepPoint, SweepRun};

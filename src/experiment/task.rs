@@ -4,6 +4,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::bench::Attack;
+use super::race::{Race, Raced};
 use super::sweep::{self, SweepRun};
 use super::table1::{self, MethodRun};
 use super::{Clock, Setup};
@@ -19,6 +20,8 @@ pub enum Task {
     Table1 { setup: Box<Setup>, attackers: Vec<AttackerChoice> },
     /// One β and seed of the sweep.
     Sweep { setup: Box<Setup> },
+    /// An expert, the clone and the optimal policy from one cell.
+    Race(Box<Race>),
 }
 
 /// What comes of a task.
@@ -27,6 +30,7 @@ pub enum Outcome {
     Attack(Attack, Box<Cloned>),
     Table1(Vec<MethodRun>),
     Sweep(SweepRun),
+    Race(Box<Raced>),
 }
 
 impl Task {
@@ -46,6 +50,9 @@ impl Task {
             Task::Sweep { setup } => {
                 sweep::check(&setup.config)?;
                 SweepRun::run(setup, progress)?.map(Outcome::Sweep)
+            }
+            Task::Race(race) => {
+                race.run(progress).map_err(|error| error.to_string())?.map(|raced| Outcome::Race(Box::new(raced)))
             }
         })
     }

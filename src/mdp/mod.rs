@@ -2,6 +2,7 @@
 //!
 //! Everything here is exact or a single draw; nothing learns and nothing knows of ensembles.
 
+mod arrival;
 mod grid;
 mod model;
 mod optimal;
@@ -9,6 +10,7 @@ mod policy;
 mod returns;
 mod rollout;
 
+pub use arrival::Arrivals;
 pub use grid::{Action, Cell, Grid, GridError, GridSpec};
 pub use model::{Transition, TransitionModel, transition_model};
 pub use optimal::optimal_policy;

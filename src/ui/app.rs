@@ -4,6 +4,7 @@ use super::board::Shown;
 use super::commands::PaletteWindow;
 use super::compare::Kept;
 use super::experiments::bench::BenchTab;
+use super::experiments::race::RaceTab;
 use super::experiments::sweep::SweepTab;
 use super::experiments::table1::Table1Tab;
 use super::heatmap::Pictures;
@@ -35,16 +36,18 @@ pub enum Tab {
     Learn,
     Train,
     World,
+    Race,
     Sweep,
     Bench,
     Table1,
 }
 
 /// Every tab: its name in an address, its label, and what it is for.
-pub static TABS: [(Tab, &str, &str, &str); 6] = [
+pub static TABS: [(Tab, &str, &str, &str); 7] = [
     (Tab::Learn, "learn", "Learn", "A lesson in ten steps, on the live page"),
     (Tab::Train, "train", "Train", "Policies and their training, live"),
     (Tab::World, "world", "World", "Draw walls, move the goal, and train in it"),
+    (Tab::Race, "race", "Race", "An expert, the clone and the optimal policy from one cell"),
     (Tab::Sweep, "sweep", "β sweep", "Whole runs for many β"),
     (Tab::Bench, "bench", "Attack bench", "Every cloner against the ensemble that is shown"),
     (Tab::Table1, "table1", "Table 1", "The paper's comparison, over seeds"),
@@ -55,6 +58,8 @@ pub static TABS: [(Tab, &str, &str, &str); 6] = [
 pub enum Wanted {
     /// Attack it on the bench.
     Bench,
+    /// Race it.
+    Race,
     /// Give it to the visitor as a file.
     Save,
     /// Make the clones that are not quick.
@@ -120,6 +125,7 @@ pub struct App {
     pub pool: Pool,
     pub(super) host: Box<dyn Host>,
     pub(super) world: WorldTab,
+    pub(super) race: RaceTab,
     pub(super) bench: BenchTab,
     pub(super) table1: Table1Tab,
     pub(super) sweep: SweepTab,
@@ -197,6 +203,7 @@ impl App {
             reproduced: None,
             address: (String::new(), 0.0),
             bench: BenchTab::default(),
+            race: RaceTab::default(),
             table1: Table1Tab::default(),
             sweep: SweepTab::default(),
             wanted: Vec::new(),
@@ -444,6 +451,7 @@ impl App {
         for (id, event) in self.pool.receive() {
             let batches = [&mut self.bench.batch, &mut self.table1.batch, &mut self.sweep.batch];
             batches.into_iter().flatten().for_each(|batch| batch.hear(id, &event, self.now));
+            self.race.hear(id, &event, self.now);
             self.take_clone(id, event);
         }
         while let Some((name, text)) = self.host.opened() {
@@ -465,6 +473,11 @@ impl App {
                     let mut bench = std::mem::take(&mut self.bench);
                     bench.attack(exported.clone(), self, self.now);
                     self.bench = bench;
+                }
+                Wanted::Race => {
+                    let mut race = std::mem::take(&mut self.race);
+                    race.begin(exported.clone(), self, self.now);
+                    self.race = race;
                 }
                 Wanted::Save => {
                     if let Ok(text) = serde_json::to_string(&exported.file) {

@@ -2,7 +2,7 @@
 
 use egui::{Color32, Label, Rangef, RichText, TextStyle, Ui, Vec2, vec2};
 use egui_plot::{
-    AxisHints, GridInput, HoverPosition, Line, LineStyle, Plot, PlotPoint, PlotPoints, Points, Text, VLine,
+    AxisHints, Bar, BarChart, GridInput, HoverPosition, Line, LineStyle, Plot, PlotPoint, PlotPoints, Points, Text, VLine,
     uniform_grid_spacer,
 };
 
@@ -31,6 +31,8 @@ pub enum Style {
     /// A line with its points marked.
     Marked,
     Points,
+    /// Bars from zero, each as wide as they are apart.
+    Bars,
 }
 
 /// What the axes say, and what they must hold besides the curves.
@@ -85,6 +87,13 @@ pub fn plot(ui: &mut Ui, axes: Axes, curves: Vec<Curve>) -> Option<f64> {
     let cursor = axes.cursor;
     let shown = plot.show(ui, |plot| {
         for Curve { name, color, points, style } in curves {
+            if style == Style::Bars {
+                let width = points.windows(2).next().map_or(1.0, |pair| pair[1][0] - pair[0][0]);
+                let fill = color.gamma_multiply(0.4);
+                let bars = points.iter().map(|&[x, y]| Bar::new(x, y).width(width).fill(fill)).collect();
+                plot.bar_chart(BarChart::new(name, bars).allow_hover(false));
+                continue;
+            }
             if style != Style::Points {
                 let line = Line::new(name.clone(), PlotPoints::from(points.clone())).color(color).width(if style == Style::Thin { 1.0 } else { 2.0 });
                 plot.line(if style == Style::Dashed { line.style(LineStyle::dashed_loose()) } else { line });

@@ -60,6 +60,17 @@ pub fn digest(digest: u64) -> String {
     format!("{digest:016x}")
 }
 
+/// A probability to a tenth of a per cent; the same at the ends.
+pub fn fine_percent(p: f64) -> String {
+    match p {
+        p if p <= 0.0 => "0 %".to_owned(),
+        p if p >= 1.0 - 1e-12 => "100 %".to_owned(),
+        p if p < 0.0005 => "< 0.1 %".to_owned(),
+        p if p >= 0.9995 => "> 99.9 %".to_owned(),
+        p => format!("{:.1} %", 100.0 * p),
+    }
+}
+
 /// A return of some kind.
 pub fn of_kind(kind: &ReturnKind, value: f64) -> String {
     if kind.is_steps { steps(value) } else { percent(value) }
@@ -78,5 +89,7 @@ mod tests {
         assert_eq!(steps(12345.0), "1.2×10⁴");
         assert_eq!((steps(-1e300).as_str(), steps(f64::INFINITY).as_str()), ("< −10³⁸", "> 10³⁸"));
         assert_eq!([0.0, 1.0, 0.999_99, 0.001, 0.136].map(percent), ["0 %", "100 %", "> 99 %", "< 1 %", "14 %"]);
+        let fine = [0.0, 1.0, 0.999_99, 0.0001, 0.1364, 0.9994].map(fine_percent);
+        assert_eq!(fine, ["0 %", "100 %", "> 99.9 %", "< 0.1 %", "13.6 %", "99.9 %"]);
     }
 }

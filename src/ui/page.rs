@@ -177,6 +177,11 @@ impl App {
                     tab.show(ui, self);
                     self.world = tab;
                 }
+                Tab::Race => {
+                    let mut tab = std::mem::take(&mut self.race);
+                    tab.show(ui, self);
+                    self.race = tab;
+                }
                 Tab::Sweep => {
                     let mut tab = std::mem::take(&mut self.sweep);
                     tab.show(ui, self);

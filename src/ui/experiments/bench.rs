@@ -2,7 +2,7 @@
 
 use egui::{RichText, Ui, vec2};
 
-use super::{Batch, choose_cloners, exports, introduce};
+use super::{Batch, choose_cloners, exports, introduce, title_of};
 use crate::ape::EnsembleFile;
 use crate::attack::AttackerChoice;
 use crate::experiment::{Attack, Bench, Outcome, Task, ensemble_returns};
@@ -46,11 +46,7 @@ impl BenchTab {
         let Ok((grid, ensemble)) = exported.file.clone().check() else { return };
         let config = &app.setup().config;
         let (horizon, seed) = (config.horizon, config.seed);
-        let title = match (&app.opened, exported.update) {
-            (Some(name), _) => name.clone(),
-            (None, 0) => "the ensemble of this preset".to_owned(),
-            (None, update) => format!("the ensemble after update {update}"),
-        };
+        let title = title_of(&exported, app);
         self.subject = Some(Subject { title, horizon, seed, ensemble: ensemble_returns(&grid, &ensemble, horizon) });
         // What it came from does not matter to whoever attacks it.
         let file = Box::new(EnsembleFile { config: None, ..exported.file });

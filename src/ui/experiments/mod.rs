@@ -1,7 +1,8 @@
-//! The experiments as tabs of the page: attack bench, Table 1, sweep over β. What they have in common is a batch of
+//! The experiments as tabs of the page: attack bench, race, Table 1, sweep over β. What they have in common is a batch of
 //! tasks with its progress, and a choice of cloners.
 
 pub mod bench;
+pub mod race;
 pub mod sweep;
 pub mod table1;
 
@@ -13,7 +14,7 @@ use super::table::Cell;
 use super::theme::Palette;
 use crate::attack::AttackerChoice;
 use crate::experiment::{Outcome, Summary, Task};
-use crate::lab::{Pool, TaskEvent, TaskId};
+use crate::lab::{Exported, Pool, TaskEvent, TaskId};
 
 /// Tasks under way, and what has come of them.
 pub struct Batch {
@@ -115,6 +116,15 @@ impl Batch {
 fn status(ui: &mut Ui, text: &str) {
     let label = ui.label(RichText::new(text).small().color(Palette::of(ui).muted));
     ui.ctx().accesskit_node_builder(label.id, |node| node.set_role(egui::Role::Status));
+}
+
+/// What an ensemble from the session is called in a sentence.
+fn title_of(exported: &Exported, app: &App) -> String {
+    match (&app.opened, exported.update) {
+        (Some(name), _) => name.clone(),
+        (None, 0) => "the ensemble of this preset".to_owned(),
+        (None, update) => format!("the ensemble after update {update}"),
+    }
 }
 
 /// Which of the cloners take part.
