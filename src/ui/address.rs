@@ -89,7 +89,9 @@ impl App {
 
     /// Keeps a file for the next visit of this visitor.
     pub(super) fn keep_file(&mut self, name: &str, text: &str) -> Result<(), String> {
-        self.host.keep(FILE, &format!("{name}\n{text}")).map_err(|error| format!("{error} A reload will not bring {name} back."))
+        self.host
+            .keep(FILE, &format!("{name}\n{text}"))
+            .map_err(|error| format!("{error} A reload will not bring {name} back."))
     }
 
     /// Shows what an address says; where it is no good, says why and shows the default.

@@ -387,6 +387,14 @@ impl App {
         }
     }
 
+    /// The digest that the link which was opened has for the moment shown.
+    pub fn promised(&self) -> Option<u64> {
+        let (_, snapshot) = self.shown()?;
+        let reproduced =
+            self.reproduced.filter(|reproduced| (reproduced.run, reproduced.update) == (snapshot.run, snapshot.update));
+        reproduced.map(|reproduced| reproduced.promised)
+    }
+
     /// The update that is shown, or about to be.
     pub fn moment(&self) -> u32 {
         self.view.sought.or(self.shown.as_ref().map(|shown| shown.snapshot.update)).unwrap_or(0)

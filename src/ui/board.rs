@@ -3,10 +3,10 @@
 use egui::{Ui, UiBuilder, vec2};
 
 use super::app::View;
+use super::compare::Kept;
 use super::heatmap::{self, Pictures};
 use super::panels::{self, Ground, Panel, Plan, Touched};
 use super::theme::{self, GAP, NARROW};
-use super::compare::Kept;
 use super::{chart, inspector, timeline};
 use crate::experiment::CurvePoint;
 use crate::lab::{Snapshot, Started};

@@ -2,8 +2,8 @@
 
 use egui::{Color32, Label, Rangef, RichText, TextStyle, Ui, Vec2, vec2};
 use egui_plot::{
-    AxisHints, Bar, BarChart, GridInput, HoverPosition, Line, LineStyle, Plot, PlotPoint, PlotPoints, Points, Text, VLine,
-    uniform_grid_spacer,
+    AxisHints, Bar, BarChart, GridInput, HoverPosition, Line, LineStyle, Plot, PlotPoint, PlotPoints, Points, Text,
+    VLine, uniform_grid_spacer,
 };
 
 use super::app::View;
@@ -95,7 +95,9 @@ pub fn plot(ui: &mut Ui, axes: Axes, curves: Vec<Curve>) -> Option<f64> {
                 continue;
             }
             if style != Style::Points {
-                let line = Line::new(name.clone(), PlotPoints::from(points.clone())).color(color).width(if style == Style::Thin { 1.0 } else { 2.0 });
+                let line = Line::new(name.clone(), PlotPoints::from(points.clone()))
+                    .color(color)
+                    .width(if style == Style::Thin { 1.0 } else { 2.0 });
                 plot.line(if style == Style::Dashed { line.style(LineStyle::dashed_loose()) } else { line });
             }
             if matches!(style, Style::Marked | Style::Points) {

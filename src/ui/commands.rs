@@ -3,10 +3,11 @@
 use egui::{Context, Frame, Key, KeyboardShortcut, Modal, Modifiers, RichText, ScrollArea, TextEdit, Ui};
 
 use super::app::{App, TABS, Tab, Wanted};
-use super::theme::{self, Palette};
+use super::theme::Palette;
 use super::widgets::{Icon, icon_button};
 use crate::experiment::{PRESETS, WORLDS};
 use crate::lab::{Command as ToSession, RunState};
+use crate::picture::COLOR_MAPS;
 
 /// A line of the table.
 pub struct Command {
@@ -238,7 +239,7 @@ pub static COMMANDS: [Command; 24] = [
         keys: &[key(Key::C)],
         can: always,
         run: |app, ctx| {
-            let color_map = (app.preferences.color_map + 1) % theme::COLOR_MAPS.len();
+            let color_map = (app.preferences.color_map + 1) % COLOR_MAPS.len();
             app.prefer(super::settings::Preferences { color_map, ..app.preferences }, ctx);
         },
     },
@@ -314,7 +315,8 @@ fn shortcut(keys: &KeyboardShortcut) -> String {
 pub fn button(ui: &mut Ui, app: &mut App, name: &str) {
     let command = named(name);
     let can = (command.can)(app);
-    let response = ui.add_enabled_ui(can, |ui| icon_button(ui, command.icon.unwrap_or(Icon::Help), command.title, false));
+    let response =
+        ui.add_enabled_ui(can, |ui| icon_button(ui, command.icon.unwrap_or(Icon::Help), command.title, false));
     if response.inner.on_hover_text(command.tip()).clicked() {
         (command.run)(app, ui.ctx());
     }
@@ -342,7 +344,8 @@ pub fn listen(ctx: &Context, app: &mut App) {
         for keys in command.keys {
             const OF_WIDGETS: [Key; 7] =
                 [Key::Space, Key::ArrowLeft, Key::ArrowRight, Key::ArrowUp, Key::ArrowDown, Key::Home, Key::End];
-            let is_taken = (has_focus && OF_WIDGETS.contains(&keys.logical_key)) || (is_blocked && command.name != "help");
+            let is_taken =
+                (has_focus && OF_WIDGETS.contains(&keys.logical_key)) || (is_blocked && command.name != "help");
             // Exactly these modifiers, but for Ctrl or Cmd.
             let is_pressed = !is_taken
                 && ctx.input_mut(|input| {
@@ -401,7 +404,9 @@ fn lines() -> Vec<(Deed, String, &'static str, String)> {
     let mut lines: Vec<_> = COMMANDS
         .iter()
         .filter(|command| command.name != "palette")
-        .map(|command| (Deed::Command(command), command.title.to_owned(), command.help, command.key().unwrap_or_default()))
+        .map(|command| {
+            (Deed::Command(command), command.title.to_owned(), command.help, command.key().unwrap_or_default())
+        })
         .collect();
     for (index, (tab, _, label, help)) in TABS.iter().enumerate() {
         let key = TAB_KEYS.get(index).map_or("", |key| key.name()).to_owned();
@@ -442,9 +447,9 @@ pub fn show_palette(ctx: &Context, app: &mut App) {
     let is_moved = chosen != app.palette.chosen;
     let mut done = found.get(chosen).filter(|_| is_entered).map(|line| line.0);
     let screen = ctx.content_rect().size();
-    let response = Modal::new(egui::Id::unique("palette")).frame(Frame::popup(&ctx.global_style()).inner_margin(12)).show(
-        ctx,
-        |ui| {
+    let response = Modal::new(egui::Id::unique("palette"))
+        .frame(Frame::popup(&ctx.global_style()).inner_margin(12))
+        .show(ctx, |ui| {
             ui.set_width(480.0_f32.min(screen.x - 48.0));
             let edit = TextEdit::singleline(&mut query).hint_text("Find a command, preset, world or tab");
             let edit = ui.add(edit.desired_width(f32::INFINITY).margin(egui::Margin::symmetric(8, 8)));
@@ -452,29 +457,32 @@ pub fn show_palette(ctx: &Context, app: &mut App) {
             if edit.accessible_name("Find a command").changed() {
                 chosen = 0;
             }
-            ScrollArea::vertical().max_height((screen.y - 160.0).min(420.0)).auto_shrink([false, true]).show(ui, |ui| {
-                let palette = Palette::of(ui);
-                for (index, (deed, title, help, key)) in found.iter().enumerate() {
-                    let can = match deed {
-                        Deed::Command(command) => (command.can)(app),
-                        _ => true,
-                    };
-                    let button = egui::Button::selectable(index == chosen, title.as_str()).shortcut_text(key.as_str());
-                    let button = button.min_size(egui::vec2(ui.available_width(), 0.0));
-                    let response = ui.add_enabled(can, button).accessible_name(title).on_hover_text(*help);
-                    if index == chosen && is_moved {
-                        response.scroll_to_me(None);
+            ScrollArea::vertical().max_height((screen.y - 160.0).min(420.0)).auto_shrink([false, true]).show(
+                ui,
+                |ui| {
+                    let palette = Palette::of(ui);
+                    for (index, (deed, title, help, key)) in found.iter().enumerate() {
+                        let can = match deed {
+                            Deed::Command(command) => (command.can)(app),
+                            _ => true,
+                        };
+                        let button =
+                            egui::Button::selectable(index == chosen, title.as_str()).shortcut_text(key.as_str());
+                        let button = button.min_size(egui::vec2(ui.available_width(), 0.0));
+                        let response = ui.add_enabled(can, button).accessible_name(title).on_hover_text(*help);
+                        if index == chosen && is_moved {
+                            response.scroll_to_me(None);
+                        }
+                        if response.clicked() {
+                            done = Some(*deed);
+                        }
                     }
-                    if response.clicked() {
-                        done = Some(*deed);
+                    if found.is_empty() {
+                        ui.label(RichText::new(format!("Nothing is called “{query}”.")).color(palette.muted));
                     }
-                }
-                if found.is_empty() {
-                    ui.label(RichText::new(format!("Nothing is called “{query}”.")).color(palette.muted));
-                }
-            });
-        },
-    );
+                },
+            );
+        });
     app.palette.chosen = chosen;
     if response.should_close() {
         return;

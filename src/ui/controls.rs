@@ -15,11 +15,13 @@ const ELSEWHERE: [&str; 5] = ["algorithm", "experts", "beta", "observer", "seed"
 pub fn show(ui: &mut Ui, app: &mut App) {
     let mut config = app.setup().config.clone();
     let is_given = app.setup().ensemble.is_some();
+    let explains = app.preferences.explains;
     if is_given {
         let text = "This preset shows a given ensemble. Changing anything here trains one.";
         ui.label(RichText::new(text).small().color(Palette::of(ui).muted));
     }
     section(ui, "Algorithm");
+    explain(ui, explains, Field::named("algorithm"));
     let options = [
         (AlgorithmKind::PgApe, "PG-APE", "The paper's Algorithm 1: policy gradient from sampled episodes"),
         (
@@ -36,6 +38,9 @@ pub fn show(ui: &mut Ui, app: &mut App) {
         let is_chosen = config.observer.model().name == choice.model().name;
         let text = format!("{}: {}", choice.model().name, choice.model().title);
         let response = ui.radio(is_chosen, text).on_hover_text(choice.model().summary);
+        if explains {
+            ui.label(RichText::new(choice.model().summary).small().color(Palette::of(ui).muted));
+        }
         if response.clicked() && !is_chosen {
             config.observer = choice;
         }
@@ -58,6 +63,7 @@ pub fn show(ui: &mut Ui, app: &mut App) {
         }
     }
     section(ui, "Experts");
+    explain(ui, explains, Field::named("experts"));
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing.x = 2.0;
         ui.spacing_mut().button_padding.x = 2.0;
@@ -76,6 +82,7 @@ pub fn show(ui: &mut Ui, app: &mut App) {
         }
     });
     section(ui, "Seed");
+    explain(ui, explains, Field::named("seed"));
     ui.horizontal(|ui| {
         let drag = DragValue::new(&mut config.seed).speed(0.2).update_while_editing(false);
         ui.add(drag).accessible_name("Seed").on_hover_text(Field::named("seed").tip());
@@ -93,7 +100,7 @@ pub fn show(ui: &mut Ui, app: &mut App) {
             "Every other field of the configuration. Where it differs from the paper, the paper's value stands beside it.";
         ui.label(RichText::new(text).small().color(Palette::of(ui).muted));
         for field in FIELDS.iter().filter(|field| !ELSEWHERE.contains(&field.name)) {
-            show_field(ui, field, &mut config);
+            show_field(ui, field, explains, &mut config);
         }
         if ui.button("All as in the paper").clicked() {
             config = Config { seed: config.seed, ..Config::paper() };
@@ -104,10 +111,18 @@ pub fn show(ui: &mut Ui, app: &mut App) {
     }
 }
 
-fn show_field(ui: &mut Ui, field: &Field, config: &mut Config) {
+/// What a field is, under its name, where that is wished for.
+fn explain(ui: &mut Ui, explains: bool, field: &Field) {
+    if explains {
+        ui.label(RichText::new(field.tip()).small().color(Palette::of(ui).muted));
+    }
+}
+
+fn show_field(ui: &mut Ui, field: &Field, explains: bool, config: &mut Config) {
     let palette = Palette::of(ui);
     ui.add_space(2.0);
     ui.label(RichText::new(field.label).small());
+    explain(ui, explains, field);
     ui.horizontal_wrapped(|ui| {
         let tip = format!("{} Expected: {}.", field.help, field.expected());
         match &field.kind {

@@ -206,8 +206,20 @@ fn progress(app: &App) -> String {
         _ if app.is_retraining() => "retraining …".to_owned(),
         RunState::Given => "given ensemble, nothing to train".to_owned(),
         RunState::Playing => format!("training, {of}"),
-        RunState::Paused => format!("paused at {of}"),
-        RunState::Finished => format!("trained, {of}, {} of work", seconds(snapshot.training_ms)),
+        RunState::Paused => format!("paused at {of}{}", digest(app, snapshot)),
+        RunState::Finished => {
+            format!("trained, {of}, {} of work{}", seconds(snapshot.training_ms), digest(app, snapshot))
+        }
+    }
+}
+
+/// The digest of the moment shown, and whether it is that of the link which was opened.
+fn digest(app: &App, snapshot: &Snapshot) -> String {
+    let text = format!(", digest {}", numbers::digest(snapshot.digest));
+    match app.promised() {
+        None => text,
+        Some(promised) if promised == snapshot.digest => text + ", the same as in the link",
+        Some(promised) => format!("{text}, but the link was made with {}", numbers::digest(promised)),
     }
 }
 

@@ -1,7 +1,8 @@
 //! What this page is, in a few paragraphs.
 
-use egui::{Frame, Modal, RichText, Ui};
+use egui::{Frame, Grid, Modal, RichText, Ui};
 
+use super::commands;
 use super::theme::{self, Palette};
 
 const PARAGRAPHS: [(&str, &str); 5] = [
@@ -26,7 +27,7 @@ const PARAGRAPHS: [(&str, &str); 5] = [
         "What to try",
         "Move β to 0: the experts agree, and the clone is as good as they are. Move it up: they disagree where it hurts, \
          and the blind clone gets lost. Then choose the observer “occupancy”, who clones the demonstrations \
-         themselves: the protection is gone, whatever β is. The tabs hold the paper's tables and every cloner.",
+         themselves: the protection is gone, whatever β is. The tabs hold a lesson, a race, a world to draw, the paper's tables and every cloner.",
     ),
     (
         "Why that must be",
@@ -51,6 +52,17 @@ pub fn show(ui: &mut Ui) -> bool {
                 ui.label(RichText::new(title).text_style(theme::strong()));
                 ui.label(text);
             }
+            ui.add_space(6.0);
+            ui.label(RichText::new("Keys").text_style(theme::strong()));
+            Grid::new("keys").num_columns(4).spacing([10.0, 2.0]).show(ui, |ui| {
+                for (index, (key, title)) in commands::shortcuts().enumerate() {
+                    ui.label(RichText::new(key).text_style(theme::strong()));
+                    ui.label(title);
+                    if index % 2 == 1 {
+                        ui.end_row();
+                    }
+                }
+            });
         });
         ui.add_space(8.0);
         ui.button("Close").clicked()

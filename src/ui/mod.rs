@@ -4,7 +4,7 @@
 //! - toolbar, headline, controls, board (panels, chart, inspector), help: the parts of the page.
 //! - experiments: the tabs beside training. export: pictures, curve and model as texts. host: files, which a browser and a window give in different ways.
 //! - heatmap: one policy on one grid. chart, table: figures over figures. theme: every colour, font and distance. numbers: how they are written.
-//!   widgets: small pieces that several parts use. focus: the ring around what the keyboard acts on.
+//!   math: equations. widgets: small pieces that several parts use. focus: the ring around what the keyboard acts on.
 
 mod address;
 mod app;
@@ -22,6 +22,7 @@ mod help;
 mod host;
 mod inspector;
 mod lesson;
+mod math;
 mod numbers;
 mod page;
 mod panels;

@@ -4,12 +4,13 @@ use egui::{CentralPanel, Frame, Margin, RichText, ScrollArea, Ui};
 
 use super::app::{App, Session, TABS, Tab, View};
 use super::board::Shown;
+use super::compare::{self, Kept};
 use super::heatmap::Pictures;
 use super::panels::Touched;
-use super::compare::{self, Kept};
 use super::theme::{self, GAP, NARROW, Palette, SPACE, WIDE};
 use super::widgets::choose_wrapped;
 use super::{commands, controls, focus, headline, heatmap, help, lesson, policy_table, toolbar};
+use crate::lab::Command;
 
 /// Width of the controls and of the lesson, where they stand beside the board.
 const CONTROLS: f32 = 272.0;
@@ -82,9 +83,9 @@ impl App {
                 }))
                 .show(ui, |ui| {
                     theme::card(ui).show(ui, |ui| {
-                        ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
-                            if is_lesson { lesson::show(ui, self) } else { controls::show(ui, self) }
-                        });
+                        ScrollArea::vertical()
+                            .auto_shrink([false, false])
+                            .show(ui, |ui| if is_lesson { lesson::show(ui, self) } else { controls::show(ui, self) });
                     });
                 });
             let rest = Frame::new().fill(Palette::of(ui).ground).inner_margin(Margin {

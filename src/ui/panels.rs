@@ -144,7 +144,11 @@ impl Plan {
     /// So many columns over a width, as high as they come.
     pub fn stacked(width: f32, columns: usize, grid: &Grid) -> Plan {
         let picture = ((width - 2.0 * GAP * (columns - 1) as f32) / columns as f32).floor();
-        Plan { columns, picture: vec2(picture, picture * grid.rows() as f32 / grid.cols() as f32), is_rest_right: false }
+        Plan {
+            columns,
+            picture: vec2(picture, picture * grid.rows() as f32 / grid.cols() as f32),
+            is_rest_right: false,
+        }
     }
 
     /// The largest pictures in an area that is theirs alone.

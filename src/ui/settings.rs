@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 use super::app::App;
 use super::theme::{self, Palette};
 use super::widgets::choose;
+use crate::picture::COLOR_MAPS;
 
 /// What a visitor prefers.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -59,7 +60,7 @@ impl App {
         if !TEXT_SIZES.iter().any(|(size, ..)| *size == preferences.text_size) {
             preferences.text_size = 1.0;
         }
-        preferences.color_map = preferences.color_map.min(theme::COLOR_MAPS.len() - 1);
+        preferences.color_map = preferences.color_map.min(COLOR_MAPS.len() - 1);
         self.preferences = preferences;
         self.apply_preferences(ctx);
     }
@@ -75,7 +76,8 @@ impl App {
         }
     }
 
-    fn apply_preferences(&self, ctx: &Context) {
+    fn apply_preferences(&mut self, ctx: &Context) {
+        self.view.color_map = self.preferences.color_map;
         ctx.set_theme(match self.preferences.theme {
             Theme::System => ThemePreference::System,
             Theme::Light => ThemePreference::Light,
@@ -101,7 +103,7 @@ pub fn show(ui: &mut Ui, app: &mut App) {
     choose(ui, "Theme", &mut now.theme, &themes);
     head(ui, "Colours of the heatmaps");
     let maps: Vec<(usize, &str, &str)> =
-        theme::COLOR_MAPS.iter().enumerate().map(|(index, map)| (index, map.title, map.summary)).collect();
+        COLOR_MAPS.iter().enumerate().map(|(index, map)| (index, map.title, map.summary)).collect();
     choose(ui, "Colours", &mut now.color_map, &maps);
     head(ui, "Text size");
     choose(ui, "Text size", &mut now.text_size, &TEXT_SIZES);

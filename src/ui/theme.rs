@@ -7,6 +7,8 @@ use egui::{
     Theme, Ui, Vec2, Visuals, vec2,
 };
 
+use super::math;
+
 /// The colours of a theme.
 pub struct Palette {
     pub ground: Color32,
@@ -128,6 +130,10 @@ pub fn install(ctx: &Context) {
         fonts.families.insert(family, vec![name.to_owned()]);
     }
     fonts.families.insert(FontFamily::Monospace, vec!["Inter".to_owned()]);
+    for (name, bytes) in math::FONTS {
+        fonts.font_data.insert(name.to_owned(), Arc::new(FontData::from_static(bytes)));
+        fonts.families.insert(FontFamily::Name(name.into()), vec![name.to_owned()]);
+    }
     ctx.set_fonts(fonts);
     for theme in [Theme::Light, Theme::Dark] {
         ctx.style_mut_of(theme, |style| {
@@ -157,6 +163,11 @@ pub fn install(ctx: &Context) {
             style.animation_time = 0.08;
         });
     }
+}
+
+/// Whether the page may move by itself.
+pub fn set_motion(ctx: &Context, moves: bool) {
+    ctx.all_styles_mut(|style| style.animation_time = if moves { 0.08 } else { 0.0 });
 }
 
 /// Larger targets for fingers.

@@ -4,7 +4,6 @@ use egui::{DragValue, RichText, Slider, Ui};
 
 use super::app::View;
 use super::board::Shown;
-use super::numbers;
 use super::panels::Touched;
 use super::theme::{self, Palette};
 use super::widgets::{Icon, icon_button};
@@ -80,7 +79,8 @@ fn branch(ui: &mut Ui, shown: &Shown, touched: &mut Touched) {
         if response.changed() {
             ui.data_mut(|data| data.insert_temp(id, (run, beta)));
         }
-        let help = "Trains on from this moment with this β, as a branch of its own; the run it leaves is kept to compare with";
+        let help =
+            "Trains on from this moment with this β, as a branch of its own; the run it leaves is kept to compare with";
         if ui.button("Continue from here").on_hover_text(help).clicked() {
             touched.continue_with = Some(beta);
         }
@@ -89,14 +89,4 @@ fn branch(ui: &mut Ui, shown: &Shown, touched: &mut Touched) {
             touched.update = Some(latest);
         }
     });
-}
-
-/// A digest in words: what it is, and whether it is that of the address.
-pub fn digest(digest: u64, promised: Option<u64>) -> (String, bool) {
-    let text = format!("digest {}", numbers::digest(digest));
-    match promised {
-        None => (text, true),
-        Some(promised) if promised == digest => (format!("{text}, the same as in the link"), true),
-        Some(promised) => (format!("{text}, but the link says {}", numbers::digest(promised)), false),
-    }
 }

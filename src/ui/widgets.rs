@@ -13,9 +13,6 @@ pub enum Icon {
     Pause,
     Step,
     Reset,
-    Sun,
-    Moon,
-    Auto,
     Help,
     Add,
     Remove,
@@ -70,29 +67,17 @@ impl Icon {
                     vec![tip + vec2(-r * 0.65, r * 0.1), tip + vec2(r * 0.5, r * 0.45), tip + vec2(r * 0.1, -r * 0.7)];
                 painter.add(Shape::convex_polygon(points, color, Stroke::NONE));
             }
-            Icon::Sun => {
-                painter.circle_filled(c, r * 0.5, color);
-                for i in 0..8 {
-                    let ray = egui::Vec2::angled(i as f32 * std::f32::consts::FRAC_PI_4);
-                    painter.line_segment([c + ray * r * 0.8, c + ray * r * 1.15], stroke);
-                }
-            }
-            Icon::Moon => {
-                let full = (0..=24).map(|i| c + r * egui::Vec2::angled(0.6 + 4.5 * i as f32 / 24.0));
-                let bite = c + vec2(r * 0.45, -r * 0.25);
-                let hollow = (0..=24).map(|i| bite + r * 0.75 * egui::Vec2::angled(4.6 - 3.6 * i as f32 / 24.0));
-                painter.add(Shape::line(full.chain(hollow).collect(), stroke));
-            }
-            Icon::Auto => {
-                painter.circle_stroke(c, r, stroke);
-                let half = (0..=20).map(|i| c + r * egui::Vec2::angled(std::f32::consts::PI * (i as f32 / 20.0 - 0.5)));
-                painter.add(Shape::convex_polygon(half.collect(), color, Stroke::NONE));
-            }
             Icon::Later => {
-                painter.add(Shape::line(vec![pos2(c.x - r * 0.4, c.y - r), pos2(c.x + r * 0.6, c.y), pos2(c.x - r * 0.4, c.y + r)], stroke));
+                painter.add(Shape::line(
+                    vec![pos2(c.x - r * 0.4, c.y - r), pos2(c.x + r * 0.6, c.y), pos2(c.x - r * 0.4, c.y + r)],
+                    stroke,
+                ));
             }
             Icon::Earlier => {
-                painter.add(Shape::line(vec![pos2(c.x + r * 0.4, c.y - r), pos2(c.x - r * 0.6, c.y), pos2(c.x + r * 0.4, c.y + r)], stroke));
+                painter.add(Shape::line(
+                    vec![pos2(c.x + r * 0.4, c.y - r), pos2(c.x - r * 0.6, c.y), pos2(c.x + r * 0.4, c.y + r)],
+                    stroke,
+                ));
             }
             Icon::Pin => {
                 painter.circle_filled(c - vec2(0.0, r * 0.45), r * 0.62, color);
@@ -108,7 +93,8 @@ impl Icon {
             Icon::Save => {
                 painter.line_segment([c - vec2(0.0, r), c + vec2(0.0, r * 0.3)], stroke);
                 let tip = c + vec2(0.0, r * 0.5);
-                painter.add(Shape::line(vec![tip + vec2(-r * 0.6, -r * 0.6), tip, tip + vec2(r * 0.6, -r * 0.6)], stroke));
+                painter
+                    .add(Shape::line(vec![tip + vec2(-r * 0.6, -r * 0.6), tip, tip + vec2(r * 0.6, -r * 0.6)], stroke));
                 painter.line_segment([c + vec2(-r, r), c + vec2(r, r)], stroke);
             }
             Icon::Settings => {

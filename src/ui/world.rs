@@ -48,7 +48,8 @@ impl WorldTab {
         let grid = self.draft.clone().unwrap_or_else(|| app.setup().grid.clone());
         let area = ui.available_rect_before_wrap();
         let screen = ui.ctx().content_rect().height();
-        let room = vec2(if is_narrow { area.width() } else { 0.46 * area.width() }, (screen - area.top() - 60.0).max(260.0));
+        let room =
+            vec2(if is_narrow { area.width() } else { 0.46 * area.width() }, (screen - area.top() - 60.0).max(260.0));
         let cell = (room.x / grid.cols as f32).min(room.y / grid.rows as f32).floor().max(4.0);
         let size = cell * vec2(grid.cols as f32, grid.rows as f32);
         let draw = |tab: &mut WorldTab, ui: &mut Ui, app: &mut App| {
@@ -62,7 +63,9 @@ impl WorldTab {
         } else {
             let (left, right) = area.split_left_right_at_x(area.left() + size.x.max(240.0) + 2.0 * GAP);
             ui.scope_builder(UiBuilder::new().max_rect(left), |ui| draw(self, ui, app));
-            ui.scope_builder(UiBuilder::new().max_rect(right.with_max_y(area.top() + room.y)), |ui| show_panels(ui, app));
+            ui.scope_builder(UiBuilder::new().max_rect(right.with_max_y(area.top() + room.y)), |ui| {
+                show_panels(ui, app)
+            });
         }
     }
 
@@ -91,7 +94,8 @@ impl WorldTab {
                 ui.label(RichText::new(label).small().color(Palette::of(ui).muted));
             }
             ui.spacing_mut().slider_width = 90.0;
-            let slip = Slider::new(&mut grid.slip, 0.0..=0.9).step_by(0.05).fixed_decimals(2).update_while_editing(false);
+            let slip =
+                Slider::new(&mut grid.slip, 0.0..=0.9).step_by(0.05).fixed_decimals(2).update_while_editing(false);
             let tip = "ε: with this probability the move that is made is drawn from all five instead (paper: 0)";
             ui.add(slip).accessible_name("Slip").on_hover_text(tip);
             ui.label(RichText::new("slip").small().color(Palette::of(ui).muted));
@@ -150,7 +154,12 @@ impl WorldTab {
         }
         self.stroke_on(app, grid, rect, &response);
         if let Some(cell) = response.hover_pos().and_then(|at| cell_at(rect, grid, at)) {
-            ui.painter().rect_stroke(cell_rect(rect, grid, cell), 0.0, Stroke::new(2.0, Palette::of(ui).accent), StrokeKind::Inside);
+            ui.painter().rect_stroke(
+                cell_rect(rect, grid, cell),
+                0.0,
+                Stroke::new(2.0, Palette::of(ui).accent),
+                StrokeKind::Inside,
+            );
         }
     }
 
@@ -277,7 +286,11 @@ fn show_panels(ui: &mut Ui, app: &mut App) {
     let panels = panels::list(&shown.started, &shown.snapshot, &app.view);
     let area = ui.available_size();
     let is_narrow = ui.ctx().content_rect().width() < NARROW;
-    let plan = if is_narrow { Plan::stacked(area.x, 2, shown.grid()) } else { Plan::filling(ui, area, panels.len(), shown.grid()) };
+    let plan = if is_narrow {
+        Plan::stacked(area.x, 2, shown.grid())
+    } else {
+        Plan::filling(ui, area, panels.len(), shown.grid())
+    };
     heatmap::color_bar(ui, app.view.color_map);
     let touched = shown.show_panels(ui, &panels, &plan, &app.view, &mut app.pictures);
     app.touch(touched);
@@ -352,7 +365,9 @@ mod tests {
         assert_eq!((draft.walls.len(), &tab.refusal), (1, &None));
         tab.apply(&mut draft, (1, 1));
         assert_eq!(draft.walls, [(0, 1)]);
-        assert!(tab.refusal.as_ref().unwrap().contains("row 1, column 1: cell (row 0, column 2) cannot reach the goal"));
+        assert!(
+            tab.refusal.as_ref().unwrap().contains("row 1, column 1: cell (row 0, column 2) cannot reach the goal")
+        );
         tab.apply(&mut draft, (0, 0));
         assert!(tab.refusal.as_ref().unwrap().contains("cannot be walled in"));
         tab.stroke = Some(Stroking::MoveGoal);

@@ -173,7 +173,8 @@ async fn rasterize(svg: &str) -> Result<Blob, JsValue> {
     let loaded = Promise::new(&mut |resolve, reject| {
         image.set_onload(Some(&resolve));
         // The event that comes says nothing.
-        image.set_onerror(Some(&reject.bind1(&JsValue::UNDEFINED, &"the browser does not take the picture".into())));
+        let refusal = reject.bind1(&JsValue::UNDEFINED, &"the browser does not take the picture".into());
+        image.set_onerror(Some(refusal.unchecked_ref()));
     });
     image.set_src(&address);
     let loaded = JsFuture::from(loaded).await;

@@ -215,6 +215,7 @@ fn show_learning_curve(ui: &mut Ui, bench: &Bench, kind: usize) {
         x: |log| if log.fract().abs() < 1e-6 { numbers::grouped(libm::pow(10.0, log) as u32) } else { String::new() },
         y: chart::in_steps,
         labels: Vec::new(),
+        cursor: None,
     };
     chart::plot(ui, axes, curves);
 }

@@ -169,7 +169,7 @@ fn draw(
     chart::legend(ui, &title, curves.iter().map(|curve| (&*curve.name, curve.color)));
     let y = if kind.is_steps { chart::in_steps } else { |value| numbers::decimal(value, 2) };
     let size = vec2(ui.available_width(), 260.0);
-    chart::plot(ui, Axes { id: "sweep", size, include: Vec::new(), x, y, labels }, curves);
+    chart::plot(ui, Axes { id: "sweep", size, include: Vec::new(), x, y, labels, cursor: None }, curves);
 }
 
 fn show_table(ui: &mut Ui, sweep: &Sweep, kind: usize, is_papers: bool) {

@@ -47,8 +47,11 @@ pub fn one_cell(app: &App) -> Option<String> {
     let (clone, name) = first_clone(app)?;
     let n = snapshot.experts.len();
     let weights = clone.contexts.get(cell * n..(cell + 1) * n)?;
-    let weights: Vec<String> =
-        weights.iter().enumerate().map(|(c, p)| format!("p({}|s) = {}", c + 1, numbers::decimal(f64::from(*p), 2))).collect();
+    let weights: Vec<String> = weights
+        .iter()
+        .enumerate()
+        .map(|(c, p)| format!("p({}|s) = {}", c + 1, numbers::decimal(f64::from(*p), 2)))
+        .collect();
     Some(format!("{text}Clone ({name}) with {}: {}.", weights.join(", "), likely(&clone.view)?))
 }
 

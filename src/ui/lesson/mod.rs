@@ -71,9 +71,8 @@ pub fn show(ui: &mut Ui, app: &mut App) {
             let button = egui::Button::selectable(index == step, (index + 1).to_string()).frame_when_inactive(true);
             let response = ui.add(button.min_size(vec2(width, 0.0)));
             let name = format!("Step {}: {}", index + 1, other.title);
-            response.widget_info(|| {
-                egui::WidgetInfo::selected(egui::Role::RadioButton, true, index == step, name.clone())
-            });
+            response
+                .widget_info(|| egui::WidgetInfo::selected(egui::Role::RadioButton, true, index == step, name.clone()));
             if response.on_hover_text(other.title).clicked() {
                 go_to = Some(index);
             }

@@ -96,6 +96,7 @@ pub fn histogram(ui: &mut Ui, raced: &Raced, racer: Racer, height: f32) {
             format!("{} %", numbers::decimal(percent, decimals))
         },
         labels: Vec::new(),
+        cursor: None,
     };
     chart::plot(ui, axes, curves);
 }
