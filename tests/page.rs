@@ -390,7 +390,7 @@ fn what_is_shown_can_be_taken_away() {
     // What the caption says stands on one line or on two.
     let words = |svg: &str| -> String {
         let texts = svg.split("</text>").filter_map(|part| part.rsplit_once('>')).map(|(_, words)| words);
-        texts.collect::<Vec<_>>().join(" ")
+        texts.collect::<Vec<_>>().join(" ").replace('\u{a0}', " ")
     };
     for said in [
         "2 experts by PG-APE against the observer uniform (preset “Blind clone”): β = 0.60, seed 1, update 732 of 732.",

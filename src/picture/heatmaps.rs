@@ -21,16 +21,17 @@ pub struct Panel {
     pub rewards: Vec<(usize, f64)>,
 }
 
-/// Heat maps side by side, three a row, or fewer where the grid is much wider than high. The colour of a cell is its steps to the goal, cut at 100; the length
+/// Heat maps side by side, three a row, or fewer where the grid is large or much wider than high. The colour of a cell is its steps to the goal, cut at 100; the length
 /// of an arrow is the probability of its move, the radius of a dot that of Stay. Below them the colours' scale, and
 /// the paragraphs of `caption`, each in as many lines as it takes.
 pub fn heatmaps(grid: &Grid, panels: &[Panel], colors: &ColorMap, caption: &[String]) -> String {
     const ROOM: f64 = 768.0;
     const GAP: f64 = 24.0;
-    let per_row = match grid.cols() / grid.rows() {
-        0..2 => 3,
-        2..4 => 2,
-        _ => 1,
+    let (rows, cols) = (grid.rows(), grid.cols());
+    let per_row = match () {
+        () if cols >= 4 * rows => 1,
+        () if cols >= 2 * rows || rows.max(cols) > 20 => 2,
+        () => 3,
     };
     let side = (ROOM + GAP) / per_row as f64 - GAP;
     let cell = side / grid.rows().max(grid.cols()) as f64;

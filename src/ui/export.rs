@@ -109,7 +109,7 @@ fn origin(shown: &Shown) -> String {
     };
     let (update, last) = (numbers::grouped(snapshot.update), numbers::grouped(snapshot.last_update));
     format!(
-        "{experts} by {}{preset}: {beta}, seed {seed}, update {update} of {last}.{}",
+        "{experts} by {}{preset}: {beta}, seed {seed}, update {update} of\u{a0}{last}.{}",
         method(&setup.config),
         others(setup)
     )
@@ -148,7 +148,7 @@ fn ground(shown: &Shown) -> String {
     let denied =
         adversary_reward.as_ref().map_or(String::new(), |reward| format!(" The clone is to be denied r̃: {reward}."));
     format!(
-        "Grid of {} × {} cells, goal in row {row}, column {col}, {walls}, slip {}. T = {horizon} steps.{denied}",
+        "Grid of {}\u{a0}×\u{a0}{} cells, goal in row {row}, column {col}, {walls}, slip {}. T = {horizon} steps.{denied}",
         grid.rows(),
         grid.cols(),
         grid.slip()
