@@ -15,6 +15,8 @@ pub struct ColorMap {
     pub color: fn(f64) -> [u8; 3],
     /// What is drawn on light colours, and what on dark ones.
     inks: [[u8; 3]; 2],
+    /// Colour of the lines between and around cells, where the ground itself could be taken for a cell.
+    pub lines: Option<[u8; 3]>,
 }
 
 const SOFT_INKS: [[u8; 3]; 2] = [[0x10, 0x12, 0x16], [0xfa; 3]];
@@ -30,6 +32,7 @@ pub static COLOR_MAPS: [ColorMap; 3] = [
             [color.r, color.g, color.b]
         },
         inks: SOFT_INKS,
+        lines: None,
     },
     ColorMap {
         name: "cividis",
@@ -40,6 +43,7 @@ pub static COLOR_MAPS: [ColorMap; 3] = [
             [color.r, color.g, color.b]
         },
         inks: SOFT_INKS,
+        lines: None,
     },
     ColorMap {
         name: "contrast",
@@ -47,6 +51,7 @@ pub static COLOR_MAPS: [ColorMap; 3] = [
         summary: "White at the goal, black from 100 steps on, arrows in the opposite: for projectors, print and weak eyes.",
         color: |t| [libm::round(255.0 * t) as u8; 3],
         inks: [[0; 3], [0xff; 3]],
+        lines: Some([0x80; 3]),
     },
 ];
 

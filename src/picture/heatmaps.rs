@@ -21,37 +21,46 @@ pub struct Panel {
     pub rewards: Vec<(usize, f64)>,
 }
 
-/// Heat maps side by side, three a row. The colour of a cell is its steps to the goal, cut at 100; the length
+/// Heat maps side by side, three a row, or fewer where the grid is large or much wider than high. The colour of a cell is its steps to the goal, cut at 100; the length
 /// of an arrow is the probability of its move, the radius of a dot that of Stay. Below them the colours' scale, and
 /// the paragraphs of `caption`, each in as many lines as it takes.
 pub fn heatmaps(grid: &Grid, panels: &[Panel], colors: &ColorMap, caption: &[String]) -> String {
-    const SIDE: f64 = 240.0;
+    const ROOM: f64 = 768.0;
     const GAP: f64 = 24.0;
-    const PER_ROW: usize = 3;
-    let cell = SIDE / grid.rows().max(grid.cols()) as f64;
+    let (rows, cols) = (grid.rows(), grid.cols());
+    let per_row = match () {
+        () if cols >= 4 * rows => 1,
+        () if cols >= 2 * rows || rows.max(cols) > 20 => 2,
+        () => 3,
+    };
+    let side = (ROOM + GAP) / per_row as f64 - GAP;
+    let cell = side / grid.rows().max(grid.cols()) as f64;
     let head = if panels.iter().all(|panel| panel.subtitle.is_empty()) { 18.0 } else { 34.0 };
     let pitch = head + grid.rows() as f64 * cell + GAP;
     let mut body = String::new();
     for (i, panel) in panels.iter().enumerate() {
-        let x = MARGIN + (i % PER_ROW) as f64 * (SIDE + GAP);
-        let y = MARGIN + (i / PER_ROW) as f64 * pitch;
-        body += &text(x, y + 10.0, BOLD, &panel.title, SIDE);
-        body += &text(x, y + 26.0, QUIET, &panel.subtitle, SIDE);
+        let x = MARGIN + (i % per_row) as f64 * (side + GAP);
+        let y = MARGIN + (i / per_row) as f64 * pitch;
+        body += &text(x, y + 10.0, BOLD, &panel.title, side);
+        body += &text(x, y + 26.0, QUIET, &panel.subtitle, side);
         body += &format!(
             "<g transform=\"translate({})\">{}</g>\n",
             list(&[x, y + head]),
             heatmap(grid, panel, colors, cell)
         );
     }
-    let bar = MARGIN + panels.len().div_ceil(PER_ROW) as f64 * pitch;
+    let bar = MARGIN + panels.len().div_ceil(per_row) as f64 * pitch;
     let tenth =
         |i| format!("<stop offset=\".{i}\" stop-color=\"{}\"/>", hex(colors.of_steps(f64::from(i) * CAP / 9.0)));
     let stops: String = (0..10).map(tenth).collect();
     body += &format!("<linearGradient id=\"steps\" x2=\"1.11\">{stops}</linearGradient>");
     body += &format!("<path fill=\"url(#steps)\" d=\"M30 {}h120v12h-120z\"/>", n(bar - 10.0));
-    body += &text(MARGIN, bar, QUIET, "0", SIDE);
-    body += &text(156.0, bar, QUIET, &format!("{CAP} or more steps to the goal"), SIDE);
-    let width = 2.0 * MARGIN + panels.len().clamp(1, PER_ROW) as f64 * (SIDE + GAP) - GAP;
+    if let Some(color) = colors.lines {
+        body += &format!("<path fill=\"none\" stroke=\"{}\" d=\"M30 {}h120v12h-120z\"/>", hex(color), n(bar - 10.0));
+    }
+    body += &text(MARGIN, bar, QUIET, "0", side);
+    body += &text(156.0, bar, QUIET, &format!("{CAP} or more steps to the goal"), side);
+    let width = 2.0 * MARGIN + panels.len().clamp(1, per_row) as f64 * (side + GAP) - GAP;
     let width = width.max(380.0);
     let mut bottom = bar;
     for paragraph in caption {
@@ -85,12 +94,20 @@ fn heatmap(grid: &Grid, panel: &Panel, colors: &ColorMap, cell: f64) -> String {
         map += &format!("<path stroke=\"{}\" d=\"{cells}\"/>", hex(color));
     }
     map += "</g>";
-    // White shows between cells as a thin line, where there is room for one.
+    // A thin line, white if nothing else is asked for, shows between cells where there is room for one.
+    let (width, height) = (n(grid.cols() as f64 * cell), n(grid.rows() as f64 * cell));
+    let mut lines = String::new();
     if cell >= 12.0 {
-        let (width, height) = (n(grid.cols() as f64 * cell), n(grid.rows() as f64 * cell));
-        let across = (1..grid.rows()).map(|row| format!("M0 {}h{width}", n(row as f64 * cell)));
-        let down = (1..grid.cols()).map(|col| format!("M{} 0v{height}", n(col as f64 * cell)));
-        map += &format!("<path stroke=\"#fff\" d=\"{}\"/>", across.chain(down).collect::<String>());
+        lines.extend((1..grid.rows()).map(|row| format!("M0 {}h{width}", n(row as f64 * cell))));
+        lines.extend((1..grid.cols()).map(|col| format!("M{} 0v{height}", n(col as f64 * cell))));
+    }
+    if colors.lines.is_some() {
+        lines += &format!("M0 0h{width}v{height}h-{width}z");
+    }
+    if !lines.is_empty() {
+        let style =
+            colors.lines.map_or("stroke=\"#fff\"".to_owned(), |c| format!("fill=\"none\" stroke=\"{}\"", hex(c)));
+        map += &format!("<path {style} d=\"{lines}\"/>");
     }
     // Walls are struck through: no colour map may take them for cells.
     let walls = (0..grid.cells()).filter(|&state| grid.is_wall(state)).map(|wall| {

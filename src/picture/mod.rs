@@ -39,10 +39,10 @@ fn text(x: f64, y: f64, style: &str, words: &str, room: f64) -> String {
     format!("<text x=\"{}\" y=\"{}\"{style}{fit}>{words}</text>\n", n(x), n(y))
 }
 
-/// Words in lines no wider than `room`; a word that is wider has a line of its own.
+/// Words in lines no wider than `room`, broken at plain spaces only; a word that is wider has a line of its own.
 fn wrap(words: &str, room: f64) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
-    for word in words.split_whitespace() {
+    for word in words.split(' ') {
         match lines.last_mut() {
             Some(line) if wide(line) + wide(" ") + wide(word) <= room => *line += &format!(" {word}"),
             _ => lines.push(word.to_owned()),
@@ -52,7 +52,8 @@ fn wrap(words: &str, room: f64) -> Vec<String> {
 }
 
 fn document(width: f64, height: f64, body: &str) -> String {
-    let (width, height) = (n(width), n(height));
+    // Whole pixels, so that nothing is stretched where the document becomes an image.
+    let (width, height) = (n(libm::ceil(width)), n(libm::ceil(height)));
     let size = format!("width=\"{width}\" height=\"{height}\" viewBox=\"0 0 {width} {height}\"");
     let font = "font-family=\"Inter, Helvetica, Arial, sans-serif\" font-size=\"12\" fill=\"#101216\"";
     let ground = "<rect width=\"100%\" height=\"100%\" fill=\"#fff\"/>";

@@ -62,7 +62,11 @@ pub fn picture(shown: &Shown, view: &View) -> String {
             })
         })
         .collect();
-    let caption = [origin(shown), ground(shown), returns(shown, view), legend(shown), source(shown)];
+    let caption = [
+        format!("{} {}", origin(shown), ground(shown)),
+        returns(shown, view),
+        format!("{} {}", legend(shown), source(shown)),
+    ];
     heatmaps(shown.grid(), &panels, &COLOR_MAPS[view.color_map], &caption)
 }
 
@@ -105,7 +109,7 @@ fn origin(shown: &Shown) -> String {
     };
     let (update, last) = (numbers::grouped(snapshot.update), numbers::grouped(snapshot.last_update));
     format!(
-        "{experts} by {}{preset}: {beta}, seed {seed}, update {update} of {last}.{}",
+        "{experts} by {}{preset}: {beta}, seed {seed}, update {update} of\u{a0}{last}.{}",
         method(&setup.config),
         others(setup)
     )
@@ -126,7 +130,7 @@ fn others(setup: &Setup) -> String {
     let others: Vec<String> = FIELDS
         .iter()
         .filter(|field| !said.contains(&field.name) && field.text(&setup.config) != field.text(&default))
-        .map(|field| format!("{} {}", field.label, field.text(&setup.config)))
+        .map(|field| format!("{} {}", field.name, field.text(&setup.config)))
         .collect();
     if others.is_empty() { String::new() } else { format!(" Not as by default: {}.", others.join(", ")) }
 }
@@ -144,7 +148,7 @@ fn ground(shown: &Shown) -> String {
     let denied =
         adversary_reward.as_ref().map_or(String::new(), |reward| format!(" The clone is to be denied r̃: {reward}."));
     format!(
-        "Grid of {} × {} cells, goal in row {row}, column {col}, {walls}, slip {}. T = {horizon} steps.{denied}",
+        "Grid of {}\u{a0}×\u{a0}{} cells, goal in row {row}, column {col}, {walls}, slip {}. T = {horizon} steps.{denied}",
         grid.rows(),
         grid.cols(),
         grid.slip()
@@ -177,7 +181,7 @@ fn returns(shown: &Shown, view: &View) -> String {
 /// How the heat maps are read.
 fn legend(shown: &Shown) -> String {
     let mut legend = format!(
-        "Colour: expected steps from a cell to the flag, cut at {CAP}. Arrows are as long as their moves are probable, a dot is Stay."
+        "Colour: expected steps to the flag, cut at {CAP}. Length of an arrow: probability of the move; dot: of Stay."
     );
     if shown.grid().free_cells() < shown.grid().cells() {
         legend += " Struck through: walls.";

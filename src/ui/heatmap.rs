@@ -99,10 +99,10 @@ impl Heatmap<'_> {
         );
         let mut mesh = Mesh::default();
         let mut add = |shape: Shape| tessellator.tessellate_shape(shape, &mut mesh);
-        // The ground shows between cells as a thin line, where there is room for one.
-        add(Shape::rect_filled(rect, 0.0, palette.ground));
-        let gap = if cell.x >= 12.0 { 0.5 } else { 0.0 };
         let colors = &COLOR_MAPS[self.color_map];
+        // The ground, or what the colours have for it, shows between cells as a thin line, where there is room for one.
+        add(Shape::rect_filled(rect, 0.0, colors.lines.map_or(palette.ground, rgb)));
+        let gap = if cell.x >= 12.0 { 0.5 } else { 0.0 };
         for state in 0..self.grid.cells() {
             let place = self.cell_rect(rect, cell, state).shrink(gap);
             if self.grid.is_wall(state) {

@@ -69,9 +69,8 @@ impl Host for Files {
                 Err(error) => Err(error),
             };
             if let Err(error) = saved {
-                failures
-                    .borrow_mut()
-                    .push_back(format!("{name} could not be drawn ({error:?}); SVG needs no drawing."));
+                let why = error.as_string().unwrap_or_else(|| format!("{error:?}"));
+                failures.borrow_mut().push_back(format!("{name} could not be drawn ({why}); take the SVG instead."));
                 wake();
             }
         });
@@ -172,14 +171,13 @@ async fn rasterize(svg: &str) -> Result<Blob, JsValue> {
     let image = HtmlImageElement::new()?;
     let loaded = Promise::new(&mut |resolve, reject| {
         image.set_onload(Some(&resolve));
-        // The event that comes says nothing.
-        let refusal = reject.bind1(&JsValue::UNDEFINED, &"the browser does not take the picture".into());
-        image.set_onerror(Some(refusal.unchecked_ref()));
+        image.set_onerror(Some(&reject));
     });
     image.set_src(&address);
     let loaded = JsFuture::from(loaded).await;
     Url::revoke_object_url(&address)?;
-    loaded?;
+    // The event that comes with a failure says nothing.
+    loaded.map_err(|_| "the browser does not take it")?;
     let (width, height) = (SCALE * image.natural_width(), SCALE * image.natural_height());
     let canvas: HtmlCanvasElement = document.create_element("canvas")?.unchecked_into();
     canvas.set_width(width);
@@ -193,5 +191,5 @@ async fn rasterize(svg: &str) -> Result<Blob, JsValue> {
         }
     });
     // A canvas that is too large gives nothing.
-    JsFuture::from(drawn).await?.dyn_into().map_err(|_| "the picture is too large".into())
+    JsFuture::from(drawn).await?.dyn_into().map_err(|_| "it is too large".into())
 }
