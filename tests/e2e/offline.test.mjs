@@ -179,17 +179,16 @@ test("a version that is not whole on the server is not taken", async (t) => {
   // The list of the second version is there, but one of its files is not yet.
   await site.publish("second");
   await site.change("worker_loader.js", (text) => text.replace("// second\n", ""));
-  await page.evaluate(async () => {
+  const end = await page.evaluate(async () => {
     const registration = await navigator.serviceWorker.getRegistration();
-    await new Promise((resolve) => {
+    return new Promise((resolve) => {
       registration.addEventListener("updatefound", () => {
-        registration.installing.addEventListener("statechange", (event) => {
-          if (event.target.state === "redundant") resolve();
-        });
+        registration.installing.addEventListener("statechange", (event) => resolve(event.target.state));
       });
       document.dispatchEvent(new Event("visibilitychange"));
     });
   });
+  assert.equal(end, "redundant");
   await context.setOffline(true);
   site.stop();
   await page.reload();
