@@ -14,6 +14,10 @@ extern "C" {
     /// Shows a sentence in place of the page (index.html).
     #[wasm_bindgen(js_name = failPage)]
     fn fail_page(sentence: &str);
+
+    /// Settles when the program may start: a newer version that waits takes over before (web/offline.js).
+    #[wasm_bindgen(catch, js_name = newestVersion)]
+    async fn newest_version() -> Result<JsValue, JsValue>;
 }
 
 /// Starts the app; what keeps it from starting is shown as a sentence.
@@ -34,6 +38,8 @@ async fn run() -> Result<(), String> {
         // index.html has found something missing and says so.
         return Ok(());
     }
+    // Whatever keeps it from telling, the version that is here starts.
+    let _ = newest_version().await;
     let canvas: HtmlCanvasElement =
         element("canvas")?.dyn_into().map_err(|_| "The element \"canvas\" is no canvas.")?;
     let mirror = Mirror::new(element("mirror")?);

@@ -5,20 +5,22 @@ import { extname, join, normalize } from "node:path";
 import { fileURLToPath } from "node:url";
 import { chromium } from "playwright-core";
 
-const DIST = process.env.DIST ?? fileURLToPath(new URL("../../dist/", import.meta.url));
+export const DIST = process.env.DIST ?? fileURLToPath(new URL("../../dist/", import.meta.url));
 const TYPES = {
   ".html": "text/html",
   ".js": "text/javascript",
   ".wasm": "application/wasm",
   ".css": "text/css",
   ".svg": "image/svg+xml",
+  ".png": "image/png",
+  ".webmanifest": "application/manifest+json",
 };
 
-/** A static server for the built page on a free port of this machine. */
-export async function serve() {
+/** A static server for the built page, or another folder, on a free port of this machine. */
+export async function serve(folder = DIST) {
   const server = createServer(async (request, response) => {
     const path = normalize(decodeURIComponent(new URL(request.url, "http://localhost").pathname));
-    const file = join(DIST, path.endsWith("/") ? join(path, "index.html") : path);
+    const file = join(folder, path.endsWith("/") ? join(path, "index.html") : path);
     try {
       const bytes = await readFile(file);
       response.writeHead(200, { "Content-Type": TYPES[extname(file)] ?? "application/octet-stream" }).end(bytes);
@@ -27,7 +29,11 @@ export async function serve() {
     }
   });
   await new Promise((resolve) => server.listen(0, "127.0.0.1", resolve));
-  return { address: `http://127.0.0.1:${server.address().port}/`, close: () => server.close() };
+  const close = () => {
+    server.close();
+    server.closeAllConnections();
+  };
+  return { address: `http://127.0.0.1:${server.address().port}/`, close };
 }
 
 /** Chromium as it runs on machines without a display, also as root. */
@@ -46,16 +52,20 @@ export function launch() {
   });
 }
 
-/** Opens the page; `problems` collects all that the console and the page complain about. */
-export async function open(browser, address, options = {}) {
+/**
+ * Opens the page; `problems` collects all that the console and the page complain about. With `offline`, its service
+ * worker is let in; otherwise the browser has none to offer, as `page.route` does not see what a service worker fetches.
+ */
+export async function open(browser, address, { before, offline, ...options } = {}) {
   const context = await browser.newContext({ viewport: { width: 1280, height: 800 }, ...options });
+  if (!offline) await context.addInitScript(() => delete Navigator.prototype.serviceWorker);
   const page = await context.newPage();
   const problems = [];
   page.on("pageerror", (error) => problems.push(String(error)));
   page.on("console", (message) => {
     if (["error", "warning"].includes(message.type())) problems.push(message.text());
   });
-  if (options.before) await options.before(page);
+  if (before) await before(page);
   await page.goto(address);
-  return { page, problems, close: () => context.close() };
+  return { context, page, problems, close: () => context.close() };
 }

@@ -1,9 +1,11 @@
-//! The commands of this repository: `cargo xtask serve`, `build`, `test`, `results`, `tools`.
+//! The commands of this repository: `cargo xtask serve`, `build`, `test`, `results`, `tools`, `offline`.
 //!
 //! Everything a command needs and does not find, it installs first, saying what it does and how long
 //! that takes. `tools` says what is needed and gets it, `steps` runs one command after another and sums
-//! up. Only the standard library is used, so that this program itself builds in a moment.
+//! up, `offline` lists the page's files for its service worker. Little but the standard library is used, so
+//! that this program itself builds in a moment.
 
+mod offline;
 mod steps;
 mod tools;
 
@@ -23,6 +25,7 @@ usage: cargo xtask COMMAND
   test [STEP ...]    install what tests need, run everything (or the named steps), sum up
   results            make docs/RESULTS.md and its pictures anew (2 to 3 minutes on two cores)
   tools              only install what the other commands need
+  offline [FOLDER]   write the service worker of a built page (trunk runs this after each build)
 ";
 
 /// Why a command ended early: one sentence for the user.
@@ -37,6 +40,7 @@ fn main() -> ExitCode {
         Some("test") => test(&rest),
         Some("results") => results(),
         Some("tools") => tools::install(&tools::ALL),
+        Some("offline") => offline(&rest),
         Some("help" | "--help" | "-h") => {
             print!("{USAGE}");
             return ExitCode::SUCCESS;
@@ -138,12 +142,28 @@ fn build() -> Result<(), Failure> {
         run("node", &["web/node_modules/binaryen/bin/wasm-opt", "-Oz", &name, "-o", &name])?;
         println!("{before} bytes before, {} after", size(&file)?);
     }
+    // The files are no longer those that trunk's hook has seen.
+    offline::write(&dist())?;
     println!("dist/ holds the page: any static file server can publish it");
     Ok(())
 }
 
+/// The service worker of the page in a folder: one that is named, the one trunk is building, or `dist/`.
+fn offline(arguments: &[&str]) -> Result<(), Failure> {
+    let folder = match arguments {
+        [] => std::env::var_os("TRUNK_STAGING_DIR").map_or_else(dist, PathBuf::from),
+        [folder] => PathBuf::from(folder),
+        _ => return Err(USAGE.trim_end().to_owned()),
+    };
+    offline::write(&folder)
+}
+
+fn dist() -> PathBuf {
+    root().join("dist")
+}
+
 fn wasm_files() -> Result<Vec<PathBuf>, Failure> {
-    let dist = root().join("dist");
+    let dist = dist();
     let entries = std::fs::read_dir(&dist).map_err(|error| format!("{}: {error}", dist.display()))?;
     Ok(entries
         .filter_map(|entry| Some(entry.ok()?.path()))
@@ -153,6 +173,18 @@ fn wasm_files() -> Result<Vec<PathBuf>, Failure> {
 
 fn size(file: &Path) -> Result<u64, Failure> {
     Ok(std::fs::metadata(file).map_err(|error| format!("{}: {error}", file.display()))?.len())
+}
+
+/// The files with end-to-end tests. They are named one by one: what node makes of a folder depends on its version.
+fn end_to_end_tests() -> Result<Vec<PathBuf>, Failure> {
+    let folder = root().join("tests/e2e");
+    let entries = std::fs::read_dir(&folder).map_err(|error| format!("{}: {error}", folder.display()))?;
+    let mut files: Vec<PathBuf> = entries
+        .filter_map(|entry| Some(entry.ok()?.path()))
+        .filter(|path| path.to_string_lossy().ends_with(".test.mjs"))
+        .collect();
+    files.sort();
+    Ok(files)
 }
 
 fn test(only: &[&str]) -> Result<(), Failure> {
@@ -192,7 +224,8 @@ fn test(only: &[&str]) -> Result<(), Failure> {
     // What is published is what is tested.
     steps.step("page", "3 minutes at first", &[], build);
     steps.step("end-to-end", "2 minutes", &[Tool::Chromium, Tool::Node, Tool::NodePackages], || {
-        let mut command = program("node", &["--test", "tests/e2e/page.test.mjs"]);
+        let mut command = program("node", &["--test"]);
+        command.args(end_to_end_tests()?);
         command.env("CHROMIUM", tools::chromium()?);
         run_command(command)
     });
