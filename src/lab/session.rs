@@ -215,6 +215,11 @@ impl Session {
         let runs = self.runs;
         let run = self.training()?;
         let update = run.trainer().updates();
+        if run.trainer().config().beta == beta {
+            // What is to come has been, or comes as it would have.
+            run.go_on();
+            return Ok(());
+        }
         run.trainer_mut().set_beta(beta).map_err(|error| error.to_string())?;
         run.setup.course.turn(update, beta);
         let has_future = run.recording.as_ref().is_some_and(|recording| recording.end() > update);

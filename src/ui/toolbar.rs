@@ -119,7 +119,7 @@ fn export_menu(ui: &mut Ui, app: &mut App) {
 
 fn settings_menu(ui: &mut Ui, app: &mut App) {
     let button = icon_button(ui, Icon::Settings, "Settings", false);
-    egui::Popup::menu(&button)
+    egui::Popup::from_toggle_button_response(&button)
         .close_behavior(egui::PopupCloseBehavior::CloseOnClickOutside)
         .show(|ui| settings::show(ui, app));
 }
