@@ -192,7 +192,8 @@ fn test(only: &[&str]) -> Result<(), Failure> {
     // What is published is what is tested.
     steps.step("page", "3 minutes at first", &[], build);
     steps.step("end-to-end", "2 minutes", &[Tool::Chromium, Tool::Node, Tool::NodePackages], || {
-        let mut command = program("node", &["--test", "tests/e2e/page.test.mjs"]);
+        let mut command =
+            program("node", &["--test", "--test-concurrency=1", "tests/e2e/page.test.mjs", "tests/e2e/race.test.mjs"]);
         command.env("CHROMIUM", tools::chromium()?);
         run_command(command)
     });

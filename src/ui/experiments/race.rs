@@ -251,38 +251,53 @@ impl RaceTab {
             self.shown = None;
             self.replay = Replay::default();
         }
-        let muted = Palette::of(ui).muted;
-        let last = self.last_step();
-        ui.horizontal(|ui| {
-            ui.add_enabled_ui(last > 0, |ui| {
-                let is_over = self.replay.step >= f64::from(last);
-                let (icon, name) = match self.replay.is_playing {
-                    true => (Icon::Pause, "Pause the race"),
-                    false => (Icon::Play, "Show the race"),
-                };
-                if icon_button(ui, icon, name, false).clicked() {
-                    let step = if is_over { 0.0 } else { self.replay.step };
-                    self.replay = Replay { step, is_playing: !self.replay.is_playing, last: None };
-                }
-                let mut step = self.replay.step as u32;
-                ui.spacing_mut().slider_width = (ui.available_width() - 236.0).max(60.0);
-                let slider = Slider::new(&mut step, 0..=last.max(1)).show_value(false);
-                if ui.add(slider).accessible_name("Step of the race").changed() {
-                    self.replay = Replay { step: f64::from(step), ..Replay::default() };
-                }
-                ui.add_sized([64.0, 20.0], Label::new(RichText::new(format!("{step} of {last}")).small().color(muted)));
+        // Where there is little room, the speed has a line of its own.
+        if width < 420.0 {
+            ui.horizontal(|ui| self.show_timeline(ui, width));
+            ui.horizontal(|ui| self.show_speed(ui));
+        } else {
+            ui.horizontal(|ui| {
+                self.show_timeline(ui, width - 160.0);
+                self.show_speed(ui);
             });
-            ui.spacing_mut().slider_width = 64.0;
-            let slider = Slider::new(&mut self.speed, 0..=SPEEDS.len() - 1).show_value(false);
-            ui.add(slider).accessible_name("Speed of the race").on_hover_text("Steps per second");
-            ui.label(RichText::new(format!("{} steps/s", SPEEDS[self.speed])).small().color(muted));
-        });
+        }
         let (row, col) = grid.cell(start);
-        ui.label(
-            RichText::new(format!("Start: row {row}, column {col}. Click another cell, or use the arrow keys."))
-                .small()
-                .color(muted),
-        );
+        let text = format!("Start: row {row}, column {col}. Click another cell, or use the arrow keys.");
+        ui.label(RichText::new(text).small().color(Palette::of(ui).muted));
+    }
+
+    /// A button that stops the racers or lets them run, and a slider to any step; together of this width.
+    fn show_timeline(&mut self, ui: &mut Ui, width: f32) {
+        const COUNT: f32 = 64.0;
+        let last = self.last_step();
+        ui.add_enabled_ui(last > 0, |ui| {
+            let is_over = self.replay.step >= f64::from(last);
+            let (icon, name) = match self.replay.is_playing {
+                true => (Icon::Pause, "Pause the race"),
+                false => (Icon::Play, "Show the race"),
+            };
+            if icon_button(ui, icon, name, false).clicked() {
+                let step = if is_over { 0.0 } else { self.replay.step };
+                self.replay = Replay { step, is_playing: !self.replay.is_playing, last: None };
+            }
+            let mut step = self.replay.step as u32;
+            let others = ui.spacing().interact_size.y + COUNT + 3.0 * ui.spacing().item_spacing.x;
+            ui.spacing_mut().slider_width = (width - others).max(60.0);
+            let slider = Slider::new(&mut step, 0..=last.max(1)).show_value(false);
+            if ui.add(slider).accessible_name("Step of the race").changed() {
+                self.replay = Replay { step: f64::from(step), ..Replay::default() };
+            }
+            let text = RichText::new(format!("{step} of {last}")).small().color(Palette::of(ui).muted);
+            ui.add_sized([COUNT, 20.0], Label::new(text));
+        });
+    }
+
+    fn show_speed(&mut self, ui: &mut Ui) {
+        ui.spacing_mut().slider_width = 64.0;
+        let slider = Slider::new(&mut self.speed, 0..=SPEEDS.len() - 1).show_value(false);
+        ui.add(slider).accessible_name("Speed of the race").on_hover_text("Steps per second");
+        let text = format!("{} steps/s", SPEEDS[self.speed]);
+        ui.label(RichText::new(text).small().color(Palette::of(ui).muted));
     }
 
     fn show_controls(&mut self, ui: &mut Ui, app: &mut App) {
