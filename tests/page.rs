@@ -585,7 +585,7 @@ fn a_thousand_races_agree_with_the_exact_figures() {
     let sentences: Vec<String> = root
         .children_recursive()
         .filter_map(|node| says(&node.accesskit_node()))
-        .filter(|text| text.contains("are not there by T;"))
+        .filter(|text| text.contains("are lost;"))
         .collect();
     assert_eq!(sentences.len(), 3, "{sentences:?}");
     for sentence in &sentences {
@@ -597,8 +597,11 @@ fn a_thousand_races_agree_with_the_exact_figures() {
         assert!((number(sample) - number(exact)).abs() < 3.0, "{sentence}");
     }
     assert!(sentences[1].contains("0 % arrive") || sentences[1].contains("99"), "{}", sentences[1]);
-    assert_eq!(sentences[2], "100 % arrive (exact 100 %), 0 % are not there by T; 18.0 steps (exact 18.0)");
-    text(&page, "Bars: 1,000 episodes by their steps to the goal; lines: exact. uniform clone, from row 9, column 9");
+    assert_eq!(sentences[2], "100 % arrive (exact 100 %), 0 % are lost; 18.0 steps (exact 18.0)");
+    text(
+        &page,
+        "Bars: 1,000 episodes by their steps to the goal; lines: exact; lost: not there by T = 100. uniform clone, from row 9, column 9",
+    );
     // The page says so when its ensemble is another one than that which raced.
     let old = "The ensemble on the page has changed since";
     assert!(page.query_by_label_contains(old).is_none());

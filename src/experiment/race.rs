@@ -159,7 +159,7 @@ impl Luck {
 
 /// One of `n` equally likely outcomes, by 32 uniform bits.
 fn one_of(n: usize, bits: u32) -> usize {
-    (n as u64 * u64::from(bits) >> 32) as usize
+    ((n as u64 * u64::from(bits)) >> 32) as usize
 }
 
 /// What all racers run on.

@@ -73,7 +73,11 @@ pub fn plot(ui: &mut Ui, axes: Axes, curves: Vec<Curve>) -> Option<f64> {
             hints(AxisHints::new_x()).label_spacing(Rangef::new(20.0, 36.0)).formatter(move |mark, _| x(mark.value)),
         ])
         .custom_y_axes(vec![
-            hints(AxisHints::new_y()).label_spacing(Rangef::new(14.0, 24.0)).formatter(move |mark, _| y(mark.value)),
+            // As wide for short labels as for long ones, so that charts below one another agree.
+            hints(AxisHints::new_y())
+                .min_thickness(48.0)
+                .label_spacing(Rangef::new(14.0, 24.0))
+                .formatter(move |mark, _| y(mark.value)),
         ])
         .label_formatter(move |position| match position {
             HoverPosition::NearDataPoint { plot_name, position, .. } => {

@@ -48,8 +48,10 @@ impl WorldTab {
         let grid = self.draft.clone().unwrap_or_else(|| app.setup().grid.clone());
         let area = ui.available_rect_before_wrap();
         let screen = ui.ctx().content_rect().height();
-        let room =
-            vec2(if is_narrow { area.width() } else { 0.46 * area.width() }, (screen - area.top() - 60.0).max(260.0));
+        let room = match is_narrow {
+            true => Vec2::splat(area.width()),
+            false => vec2(0.46 * area.width(), (screen - area.top() - 60.0).max(260.0)),
+        };
         let cell = (room.x / grid.cols as f32).min(room.y / grid.rows as f32).floor().max(4.0);
         let size = cell * vec2(grid.cols as f32, grid.rows as f32);
         let draw = |tab: &mut WorldTab, ui: &mut Ui, app: &mut App| {
@@ -71,7 +73,9 @@ impl WorldTab {
 
     /// Worlds on offer, size, slip, undo.
     fn show_controls(&mut self, ui: &mut Ui, app: &mut App) {
-        let mut grid = app.setup().grid.clone();
+        let old = app.setup().grid.clone();
+        let mut grid = old.clone();
+        let is_narrow = ui.ctx().content_rect().width() < NARROW;
         ui.horizontal_wrapped(|ui| {
             let world = WORLDS.iter().find(|world| world.grid() == GridSpec { slip: 0.0, ..grid.clone() });
             let response = ComboBox::from_id_salt("world")
@@ -93,12 +97,18 @@ impl WorldTab {
                 ui.add(drag.update_while_editing(false)).accessible_name(name).on_hover_text("2 to 32 (paper: 10)");
                 ui.label(RichText::new(label).small().color(Palette::of(ui).muted));
             }
+            if is_narrow {
+                ui.end_row();
+            }
             ui.spacing_mut().slider_width = 90.0;
             let slip =
                 Slider::new(&mut grid.slip, 0.0..=0.9).step_by(0.05).fixed_decimals(2).update_while_editing(false);
             let tip = "ε: with this probability the move that is made is drawn from all five instead (paper: 0)";
             ui.add(slip).accessible_name("Slip").on_hover_text(tip);
             ui.label(RichText::new("slip").small().color(Palette::of(ui).muted));
+            if is_narrow {
+                ui.end_row();
+            }
             if ui.add_enabled(!self.before.is_empty(), egui::Button::new("Undo")).clicked()
                 && let Some(before) = self.before.pop()
             {
@@ -113,8 +123,9 @@ impl WorldTab {
         let (rows, cols) = (grid.rows, grid.cols);
         grid.goal = (grid.goal.0.min(rows - 1), grid.goal.1.min(cols - 1));
         let goal = grid.goal;
+        // Only what was changed here counts: a menu above may have changed the world already.
         grid.walls.retain(|&(row, col)| row < rows && col < cols && (row, col) != goal);
-        if grid != app.setup().grid && self.stroke.is_none() {
+        if grid != old && self.stroke.is_none() {
             self.change(app, grid);
         }
     }

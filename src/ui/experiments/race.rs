@@ -6,7 +6,7 @@ mod figures;
 
 use std::rc::Rc;
 
-use egui::{Button, ComboBox, RichText, Slider, Ui, vec2};
+use egui::{Button, ComboBox, Label, RichText, Slider, Ui, vec2};
 
 use self::board::Board;
 use super::{Batch, introduce, title_of};
@@ -41,7 +41,7 @@ pub struct RaceTab {
     figures: Option<Rc<Held>>,
     replay: Replay,
     /// The grid of the page.
-    grid: Option<Grid>,
+    grid: Option<Rc<Grid>>,
 }
 
 /// What was raced.
@@ -77,6 +77,8 @@ struct Replay {
 const SPEEDS: [u32; 9] = [1, 2, 5, 10, 20, 50, 100, 300, 1000];
 /// Episodes of a large race.
 const MANY: u32 = 1000;
+/// Width of a box to choose from.
+const BOX: f32 = 160.0;
 /// Height of a histogram, least and most.
 const HISTOGRAM: [f32; 2] = [62.0, 130.0];
 
@@ -160,12 +162,12 @@ impl RaceTab {
         if width < NARROW {
             introduce_race(ui);
             self.show_board(ui, &grid, start, board::size(&grid, width, f32::INFINITY).x);
-            self.show_controls(ui, app, &grid, start);
+            self.show_controls(ui, app);
             self.show_racers(ui, app, &grid, f32::INFINITY);
             return;
         }
-        // Below the board is its timeline.
-        let side = board::size(&grid, (0.47 * width).floor(), (height - 36.0).max(200.0)).x;
+        // Below the board are its timeline and the words about its start.
+        let side = board::size(&grid, (0.47 * width).floor(), (height - 64.0).max(200.0)).x;
         ui.horizontal_top(|ui| {
             ui.allocate_ui(vec2(side, height), |ui| {
                 ui.vertical(|ui| self.show_board(ui, &grid, start, side));
@@ -175,7 +177,7 @@ impl RaceTab {
             ui.vertical(|ui| {
                 ui.set_width(ui.available_width());
                 introduce_race(ui);
-                self.show_controls(ui, app, &grid, start);
+                self.show_controls(ui, app);
                 let left = height - (ui.cursor().top() - top);
                 self.show_racers(ui, app, &grid, left);
             });
@@ -189,7 +191,7 @@ impl RaceTab {
         if self.grid.as_ref().is_some_and(|grid| grid.spec() == spec) {
             return;
         }
-        self.grid = Grid::new(spec.clone()).ok();
+        self.grid = Grid::new(spec.clone()).ok().map(Rc::new);
         (self.start, self.shown, self.figures) = (None, None, None);
         if let Some((_, mut batch)) = self.batch.take() {
             batch.cancel(&mut app.pool, 0.0);
@@ -199,8 +201,10 @@ impl RaceTab {
     /// The cell where the next race starts.
     fn start(&self) -> Option<usize> {
         let grid = self.grid.as_ref()?;
-        let distance = grid.distances();
-        self.start.or_else(|| grid.starts().iter().map(|&s| s as usize).max_by_key(|&state| distance[state]))
+        self.start.or_else(|| {
+            let distance = grid.distances();
+            grid.starts().iter().map(|&s| s as usize).max_by_key(|&state| distance[state])
+        })
     }
 
     /// Who clones in the next race.
@@ -247,36 +251,67 @@ impl RaceTab {
             self.shown = None;
             self.replay = Replay::default();
         }
+        // Where there is little room, the speed has a line of its own.
+        if width < 420.0 {
+            ui.horizontal(|ui| self.show_timeline(ui, width));
+            ui.horizontal(|ui| self.show_speed(ui));
+        } else {
+            ui.horizontal(|ui| {
+                self.show_timeline(ui, width - 160.0);
+                self.show_speed(ui);
+            });
+        }
+        let (row, col) = grid.cell(start);
+        let text = format!("Start: row {row}, column {col}. Click another cell, or use the arrow keys.");
+        ui.label(RichText::new(text).small().color(Palette::of(ui).muted));
+    }
+
+    /// A button that stops the racers or lets them run, and a slider to any step; together of this width.
+    fn show_timeline(&mut self, ui: &mut Ui, width: f32) {
+        const COUNT: f32 = 64.0;
         let last = self.last_step();
         ui.add_enabled_ui(last > 0, |ui| {
-            ui.horizontal(|ui| {
-                let is_over = self.replay.step >= f64::from(last);
-                let (icon, name) = match self.replay.is_playing {
-                    true => (Icon::Pause, "Pause the race"),
-                    false => (Icon::Play, "Show the race"),
-                };
-                if icon_button(ui, icon, name, false).clicked() {
-                    let step = if is_over { 0.0 } else { self.replay.step };
-                    self.replay = Replay { step, is_playing: !self.replay.is_playing, last: None };
-                }
-                let mut step = self.replay.step as u32;
-                ui.spacing_mut().slider_width = (ui.available_width() - 76.0).max(60.0);
-                let slider = Slider::new(&mut step, 0..=last.max(1)).show_value(false);
-                if ui.add(slider).accessible_name("Step of the race").changed() {
-                    self.replay = Replay { step: f64::from(step), ..Replay::default() };
-                }
-                let text = format!("{step} of {last}");
-                ui.label(RichText::new(text).small().color(Palette::of(ui).muted));
-            });
+            let is_over = self.replay.step >= f64::from(last);
+            let (icon, name) = match self.replay.is_playing {
+                true => (Icon::Pause, "Pause the race"),
+                false => (Icon::Play, "Show the race"),
+            };
+            if icon_button(ui, icon, name, false).clicked() {
+                let step = if is_over { 0.0 } else { self.replay.step };
+                self.replay = Replay { step, is_playing: !self.replay.is_playing, last: None };
+            }
+            let mut step = self.replay.step as u32;
+            let others = ui.spacing().interact_size.y + COUNT + 3.0 * ui.spacing().item_spacing.x;
+            ui.spacing_mut().slider_width = (width - others).max(60.0);
+            let slider = Slider::new(&mut step, 0..=last.max(1)).show_value(false);
+            if ui.add(slider).accessible_name("Step of the race").changed() {
+                self.replay = Replay { step: f64::from(step), ..Replay::default() };
+            }
+            let text = RichText::new(format!("{step} of {last}")).small().color(Palette::of(ui).muted);
+            ui.add_sized([COUNT, 20.0], Label::new(text));
         });
     }
 
-    fn show_controls(&mut self, ui: &mut Ui, app: &mut App, grid: &Grid, start: usize) {
+    fn show_speed(&mut self, ui: &mut Ui) {
+        ui.spacing_mut().slider_width = 64.0;
+        let slider = Slider::new(&mut self.speed, 0..=SPEEDS.len() - 1).show_value(false);
+        ui.add(slider).accessible_name("Speed of the race").on_hover_text("Steps per second");
+        let text = format!("{} steps/s", SPEEDS[self.speed]);
+        ui.label(RichText::new(text).small().color(Palette::of(ui).muted));
+    }
+
+    fn show_controls(&mut self, ui: &mut Ui, app: &mut App) {
         let experts = app.shown().map_or(1, |(_, snapshot)| snapshot.experts.len() as u32);
-        ui.horizontal_wrapped(|ui| {
-            self.choose_expert(ui, experts);
-            self.choose_cloner(ui, app);
-        });
+        // A word and its box stay on one line.
+        if ui.available_width() < 2.0 * BOX + 130.0 {
+            ui.horizontal(|ui| self.choose_expert(ui, experts));
+            ui.horizontal(|ui| self.choose_cloner(ui, app));
+        } else {
+            ui.horizontal(|ui| {
+                self.choose_expert(ui, experts);
+                self.choose_cloner(ui, app);
+            });
+        }
         ui.horizontal_wrapped(|ui| {
             let is_running = self.batch.as_ref().is_some_and(|(_, batch)| batch.is_running());
             let can_race = !is_running && app.can_export();
@@ -304,17 +339,6 @@ impl RaceTab {
                 app.want(Wanted::Race);
             }
         });
-        let (row, col) = grid.cell(start);
-        ui.horizontal_wrapped(|ui| {
-            let muted = Palette::of(ui).muted;
-            ui.label(RichText::new(format!("Start: row {row}, column {col}")).small())
-                .on_hover_text("Click a cell of the board, or move it with the arrow keys");
-            ui.add_space(4.0);
-            ui.spacing_mut().slider_width = 90.0;
-            let slider = Slider::new(&mut self.speed, 0..=SPEEDS.len() - 1).show_value(false);
-            ui.add(slider).accessible_name("Speed of the race").on_hover_text("Steps per second");
-            ui.label(RichText::new(format!("{} steps/s", SPEEDS[self.speed])).small().color(muted));
-        });
         let of_page = app.view.clones.first().copied();
         if let Some(cloner) = of_page.filter(|&cloner| self.cloner.is_none() && !Race::knows(cloner)) {
             let text = format!(
@@ -335,7 +359,7 @@ impl RaceTab {
         };
         ui.label("Expert");
         ComboBox::from_id_salt("race expert")
-            .width(165.0)
+            .width(BOX)
             .selected_text(name(self.expert))
             .show_ui(ui, |ui| {
                 for expert in std::iter::once(None).chain((0..experts).map(Some)) {
@@ -354,7 +378,7 @@ impl RaceTab {
         }
         ui.label("Clone");
         ComboBox::from_id_salt("race clone")
-            .width(150.0)
+            .width(BOX)
             .height(MENU)
             .selected_text(RichText::new(chosen.to_string()).color(Palette::of(ui).clone))
             .show_ui(ui, |ui| {
@@ -407,7 +431,9 @@ impl RaceTab {
             let episodes = numbers::grouped(held.raced.episodes);
             format!("Bars: {episodes} episodes by their steps to the goal; lines: exact")
         };
-        ui.label(small(format!("{what}. {cloner} clone, from row {row}, column {col}, T = {horizon}, {title}.")));
+        ui.label(small(format!(
+            "{what}; lost: not there by T = {horizon}. {cloner} clone, from row {row}, column {col}, {title}."
+        )));
         let is_old = app.shown().is_some_and(|(_, snapshot)| (snapshot.run, snapshot.update) != *moment);
         if is_old {
             let text = "The ensemble on the page has changed since: race again to see it.";

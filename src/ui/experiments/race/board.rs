@@ -121,6 +121,7 @@ impl Board<'_> {
         for state in 0..self.grid.cells() {
             let fill = match state {
                 _ if self.grid.is_wall(state) => palette.wall,
+                _ if state == self.grid.goal() => palette.card.lerp_to_gamma(palette.warning, 0.15),
                 _ if pointed == Some(state) => palette.raised,
                 _ => palette.card,
             };
@@ -138,8 +139,11 @@ impl Board<'_> {
         for racer in order {
             let width = (side * 0.07).clamp(1.5, 4.0);
             let color = color(racer, palette);
-            for (a, b, age) in self.trail(racer) {
-                let stroke = Stroke::new(width, color.gamma_multiply(faded(age)));
+            let mut trail = self.trail(racer);
+            trail.sort_by_key(|(.., age)| std::cmp::Reverse(*age));
+            for (a, b, age) in trail {
+                // Mixed, not transparent: where two pieces meet nothing shines through.
+                let stroke = Stroke::new(width, palette.card.lerp_to_gamma(color, faded(age)));
                 painter.line_segment([center(racer, a), center(racer, b)], stroke);
             }
         }

@@ -11,9 +11,9 @@ use crate::ui::theme::{self, Palette};
 /// A racer's token, its name and where it stands after `step` steps.
 pub fn counter(ui: &mut Ui, racer: Racer, name: &str, run: Option<&Run>, step: f64) {
     let palette = Palette::of(ui);
+    ui.spacing_mut().interact_size.y = 18.0;
     ui.horizontal(|ui| {
-        ui.spacing_mut().interact_size.y = 20.0;
-        let (rect, _) = ui.allocate_exact_size(vec2(16.0, 20.0), Sense::hover());
+        let (rect, _) = ui.allocate_exact_size(vec2(16.0, 18.0), Sense::hover());
         ui.painter().add(board::token(racer, rect.center(), 6.0, palette));
         let text = run.map_or(name.to_owned(), |run| format!("{name}: {}", standing(run, step)));
         ui.label(RichText::new(text).text_style(theme::strong()).color(board::color(racer, palette)));
@@ -31,17 +31,18 @@ fn standing(run: &Run, step: f64) -> String {
     }
 }
 
-/// The figures of a racer in words: those of the sample, where there is one, next to the exact ones.
+/// The figures of a racer in words: those of the sample, where there is one, next to the exact ones. Lost is who is
+/// not there by T.
 pub fn sentence(raced: &Raced, racer: Racer) -> String {
     let exact = raced.exact(racer);
     let (arrive, steps) = (numbers::fine_percent(exact.success), numbers::decimal(exact.steps, 1));
     let lost = numbers::fine_percent(1.0 - exact.success);
     if raced.episodes == 1 {
-        return format!("exactly {arrive} arrive, {lost} are not there by T; {steps} steps in the mean");
+        return format!("exactly {arrive} arrive, {lost} are lost; {steps} steps in the mean");
     }
     let sample = raced.sample(racer);
     format!(
-        "{} arrive (exact {arrive}), {} are not there by T; {} steps (exact {steps})",
+        "{} arrive (exact {arrive}), {} are lost; {} steps (exact {steps})",
         numbers::fine_percent(sample.success),
         numbers::fine_percent(1.0 - sample.success),
         numbers::decimal(sample.steps, 1),
@@ -60,20 +61,26 @@ pub fn last_step(raced: &Raced) -> u32 {
     };
     let horizon = raced.runs[0].exact.len() as u32 - 1;
     let last = raced.runs.iter().map(holds).max().unwrap_or(0) as u32;
-    (last + 1).next_multiple_of(10).min(horizon)
+    last.max(1).next_multiple_of(10).min(horizon)
 }
 
-/// Sums of neighbours: the middle of each `width` numbers of steps, and how many per cent are there.
+/// Numbers of steps that share a bar, so that there are at most [`BARS`] and, where it can be, all are alike.
+fn bar_width(last: u32) -> u32 {
+    let least = last.div_ceil(BARS);
+    (least..=2 * least).find(|&width| last.is_multiple_of(width)).unwrap_or(least)
+}
+
+/// Sums of neighbours, from one step on: the middle of each `width` numbers of steps, and how many per cent are there.
 fn binned(share: impl Iterator<Item = f64>, width: usize) -> Vec<[f64; 2]> {
-    let share: Vec<f64> = share.collect();
-    let middle = |bin: usize| (bin * width) as f64 + (width as f64 - 1.0) / 2.0;
+    let share: Vec<f64> = share.skip(1).collect();
+    let middle = |bin: usize| 1.0 + (bin * width) as f64 + (width as f64 - 1.0) / 2.0;
     share.chunks(width).enumerate().map(|(bin, share)| [middle(bin), 100.0 * share.iter().sum::<f64>()]).collect()
 }
 
 /// The histogram of a racer's steps, where there are many episodes, and the exact distribution over it as a line.
 pub fn histogram(ui: &mut Ui, raced: &Raced, racer: Racer, height: f32) {
     let last = last_step(raced);
-    let width = (last + 1).div_ceil(BARS) as usize;
+    let width = bar_width(last) as usize;
     let run = raced.run(racer);
     let shown = last as usize + 1;
     let color = board::color(racer, Palette::of(ui));
@@ -127,11 +134,9 @@ mod tests {
     fn bins_hold_everything() {
         let raced = Raced { expert: 0, episodes: 1, runs: [run(12, true), run(100, false), run(18, true)] };
         assert_eq!(last_step(&raced), 20);
-        let bins = binned((0..7).map(f64::from), 3);
-        assert_eq!(bins, [[1.0, 300.0], [4.0, 1200.0], [7.0, 600.0]]);
-        assert_eq!(
-            sentence(&raced, Racer::Clone),
-            "exactly 0 % arrive, 100 % are not there by T; 100.0 steps in the mean"
-        );
+        let bins = binned((0..8).map(f64::from), 3);
+        assert_eq!(bins, [[2.0, 600.0], [5.0, 1500.0], [8.0, 700.0]]);
+        assert_eq!([1, 60, 70, 100, 97, 10_000].map(bar_width), [1, 1, 2, 2, 2, 200]);
+        assert_eq!(sentence(&raced, Racer::Clone), "exactly 0 % arrive, 100 % are lost; 100.0 steps in the mean");
     }
 }
