@@ -1,6 +1,6 @@
 //! Charts: lines and points over axes with legible ticks; and the chart of a training run.
 
-use egui::{Color32, Label, Rangef, RichText, TextStyle, Ui, Vec2, vec2};
+use egui::{Color32, Label, Rangef, RichText, Role, Sense, TextStyle, Ui, Vec2, WidgetInfo, vec2};
 use egui_plot::{
     AxisHints, GridInput, HoverPosition, Line, LineStyle, Plot, PlotPoint, PlotPoints, Points, Text,
     uniform_grid_spacer,
@@ -59,6 +59,8 @@ pub fn plot(ui: &mut Ui, axes: Axes, curves: Vec<Curve>) {
         .allow_drag(false)
         .allow_scroll(false)
         .allow_boxed_zoom(false)
+        // Nothing to be done with it: Tab need not stop here.
+        .sense(Sense::hover())
         .show_background(false)
         .grid_color(palette.line)
         .x_grid_spacer(uniform_grid_spacer(move |input| ticks(input, across)))
@@ -78,7 +80,8 @@ pub fn plot(ui: &mut Ui, axes: Axes, curves: Vec<Curve>) {
     for [x, y] in axes.include {
         plot = plot.include_x(x).include_y(y);
     }
-    plot.show(ui, |plot| {
+    let words = describe(&curves, y);
+    let shown = plot.show(ui, |plot| {
         for Curve { name, color, points, style } in curves {
             if style != Style::Points {
                 let line = Line::new(name.clone(), PlotPoints::from(points.clone())).color(color).width(2.0);
@@ -93,6 +96,16 @@ pub fn plot(ui: &mut Ui, axes: Axes, curves: Vec<Curve>) {
             plot.text(Text::new("", PlotPoint::new(x, y), text).anchor(egui::Align2::LEFT_BOTTOM));
         }
     });
+    shown.response.widget_info(|| WidgetInfo::labeled(Role::Figure, true, &words));
+}
+
+/// A chart in words: where each curve begins and ends.
+fn describe(curves: &[Curve], y: fn(f64) -> String) -> String {
+    let curves = curves.iter().filter_map(|Curve { name, points, .. }| {
+        let [first, last] = [points.first()?, points.last()?].map(|point| y(point[1]));
+        Some(format!("{name} from {first} to {last}"))
+    });
+    format!("Chart: {}.", curves.collect::<Vec<_>>().join("; "))
 }
 
 /// The names of curves in their colours, on one line where there is room.

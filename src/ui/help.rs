@@ -3,6 +3,7 @@
 use egui::{Frame, Modal, RichText, Ui};
 
 use super::theme::{self, Palette};
+use super::widgets::heading;
 
 const PARAGRAPHS: [(&str, &str); 5] = [
     (
@@ -40,7 +41,12 @@ pub fn show(ui: &mut Ui) -> bool {
     let frame = Frame::popup(ui.style()).inner_margin(20);
     let response = Modal::new(egui::Id::unique("help")).frame(frame).show(ui.ctx(), |ui| {
         ui.set_max_width(520.0_f32.min(ui.ctx().content_rect().width() - 48.0));
-        ui.label(RichText::new("ape-lab").heading());
+        ui.ctx().accesskit_node_builder(ui.unique_id(), |node| {
+            node.set_role(egui::Role::Dialog);
+            node.set_label("What is this?");
+            node.set_modal();
+        });
+        heading(ui, 2, RichText::new("ape-lab").heading());
         ui.label(
             RichText::new("Policies that reach the goal and cannot be cloned. Or can they?")
                 .color(Palette::of(ui).muted),
@@ -48,7 +54,7 @@ pub fn show(ui: &mut Ui) -> bool {
         egui::ScrollArea::vertical().max_height(ui.ctx().content_rect().height() - 200.0).show(ui, |ui| {
             for (title, text) in PARAGRAPHS {
                 ui.add_space(6.0);
-                ui.label(RichText::new(title).text_style(theme::strong()));
+                heading(ui, 3, RichText::new(title).text_style(theme::strong()));
                 ui.label(text);
             }
         });
