@@ -192,7 +192,11 @@ fn test(only: &[&str]) -> Result<(), Failure> {
     // What is published is what is tested.
     steps.step("page", "3 minutes at first", &[], build);
     steps.step("end-to-end", "2 minutes", &[Tool::Chromium, Tool::Node, Tool::NodePackages], || {
-        let mut command = program("node", &["--test", "tests/e2e/page.test.mjs"]);
+        // One at a time: each would slow the other's page down.
+        let mut command = program("node", &["--test", "--test-concurrency=1"]);
+        let files = std::fs::read_dir("tests/e2e").map_err(|error| format!("tests/e2e: {error}"))?;
+        let paths = files.flatten().map(|file| file.path());
+        command.args(paths.filter(|path| path.to_string_lossy().ends_with(".test.mjs")));
         command.env("CHROMIUM", tools::chromium()?);
         run_command(command)
     });
