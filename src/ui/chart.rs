@@ -1,6 +1,6 @@
 //! Charts: lines and points over axes with legible ticks; and the chart of a training run.
 
-use egui::{Color32, Label, Rangef, RichText, TextStyle, Ui, Vec2, vec2};
+use egui::{Color32, Label, Rangef, RichText, Role, Sense, TextStyle, Ui, Vec2, WidgetInfo, vec2};
 use egui_plot::{
     AxisHints, Bar, BarChart, GridInput, HoverPosition, Line, LineStyle, Plot, PlotPoint, PlotPoints, Points, Text,
     VLine, uniform_grid_spacer,
@@ -65,6 +65,9 @@ pub fn plot(ui: &mut Ui, axes: Axes, curves: Vec<Curve>) -> Option<f64> {
         .allow_drag(false)
         .allow_scroll(false)
         .allow_boxed_zoom(false)
+        // Nothing to be done with it: Tab need not stop here.
+        // Never a stop for Tab: the timeline's slider is.
+        .sense(if axes.cursor.is_some() { Sense::DRAG } else { Sense::hover() })
         .show_background(false)
         .grid_color(palette.line)
         .x_grid_spacer(uniform_grid_spacer(move |input| ticks(input, across)))
@@ -88,6 +91,7 @@ pub fn plot(ui: &mut Ui, axes: Axes, curves: Vec<Curve>) -> Option<f64> {
     for [x, y] in axes.include {
         plot = plot.include_x(x).include_y(y);
     }
+    let words = describe(&curves, y);
     let cursor = axes.cursor;
     let shown = plot.show(ui, |plot| {
         for Curve { name, color, points, style } in curves {
@@ -116,8 +120,18 @@ pub fn plot(ui: &mut Ui, axes: Axes, curves: Vec<Curve>) -> Option<f64> {
             plot.vline(VLine::new("", x).color(palette.ink).width(1.5));
         }
     });
+    shown.response.widget_info(|| WidgetInfo::labeled(Role::Figure, true, &words));
     let at = shown.response.interact_pointer_pos().filter(|_| cursor.is_some())?;
     Some(shown.transform.value_from_position(at).x)
+}
+
+/// A chart in words: where each curve begins and ends.
+fn describe(curves: &[Curve], y: fn(f64) -> String) -> String {
+    let curves = curves.iter().filter_map(|Curve { name, points, .. }| {
+        let [first, last] = [points.first()?, points.last()?].map(|point| y(point[1]));
+        Some(format!("{name} from {first} to {last}"))
+    });
+    format!("Chart: {}.", curves.collect::<Vec<_>>().join("; "))
 }
 
 /// The names of curves in their colours, on one line where there is room.

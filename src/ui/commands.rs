@@ -4,7 +4,7 @@ use egui::{Context, Frame, Key, KeyboardShortcut, Modal, Modifiers, RichText, Sc
 
 use super::app::{App, TABS, Tab, Wanted};
 use super::theme::Palette;
-use super::widgets::{Icon, icon_button};
+use super::widgets::{Icon, dialog, icon_button};
 use crate::experiment::{PRESETS, WORLDS};
 use crate::lab::{Command as ToSession, RunState};
 use crate::picture::COLOR_MAPS;
@@ -450,6 +450,7 @@ pub fn show_palette(ctx: &Context, app: &mut App) {
     let response = Modal::new(egui::Id::unique("palette"))
         .frame(Frame::popup(&ctx.global_style()).inner_margin(12))
         .show(ctx, |ui| {
+            dialog(ui, "Find a command");
             ui.set_width(480.0_f32.min(screen.x - 48.0));
             let edit = TextEdit::singleline(&mut query).hint_text("Find a command, preset, world or tab");
             let edit = ui.add(edit.desired_width(f32::INFINITY).margin(egui::Margin::symmetric(8, 8)));

@@ -144,8 +144,13 @@ fn figures(ui: &mut Ui, app: &mut App, columns: usize) {
 pub fn show_sentence(ui: &mut Ui, app: &App) {
     let progress = RichText::new(progress(app)).small().color(Palette::of(ui).muted);
     let sentence = RichText::new(sentence(app)).text_style(theme::strong());
+    // While training goes on it changes with every frame: it is announced when it holds.
+    let is_resting = !app.is_retraining() && app.shown().is_some_and(|(_, shown)| shown.state != RunState::Playing);
     let parts = |ui: &mut Ui| {
-        ui.label(sentence);
+        let response = ui.label(sentence);
+        if is_resting {
+            ui.ctx().accesskit_node_builder(response.id, |node| node.set_live(egui::accesskit::Live::Polite));
+        }
         let response = ui.label(progress);
         ui.ctx().accesskit_node_builder(response.id, |node| node.set_role(egui::Role::Status));
     };

@@ -6,7 +6,10 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 use egui::epaint::{Mesh, Tessellator};
-use egui::{Color32, Id, Pos2, Rect, Role, Sense, Shape, Stroke, StrokeKind, Ui, Vec2, WidgetInfo, pos2, vec2};
+use egui::{
+    Color32, EventFilter, Id, Pos2, Rect, Response, Role, Sense, Shape, Stroke, StrokeKind, Ui, Vec2, WidgetInfo, pos2,
+    vec2,
+};
 
 use super::theme::Palette;
 use crate::lab::PolicyView;
@@ -48,7 +51,7 @@ pub struct Heatmap<'a> {
 }
 
 impl Heatmap<'_> {
-    /// Draws into `rect`; returns the cell under the pointer.
+    /// Draws into `rect`; returns the cell under the pointer, or that which arrow keys move to.
     pub fn show(self, ui: &mut Ui, rect: Rect, pictures: &mut Pictures) -> Option<usize> {
         let response = ui.interact(rect, self.id, Sense::click());
         response.widget_info(|| WidgetInfo::labeled(Role::Image, true, self.name));
@@ -75,12 +78,27 @@ impl Heatmap<'_> {
             ui.painter().rect_stroke(mark, 2.0, Stroke::new(2.0, Color32::WHITE), StrokeKind::Outside);
         }
         let pointed = response.hover_pos().or(response.interact_pointer_pos()).filter(|at| rect.contains(*at));
-        pointed.map(|at| {
+        self.cell_by_key(ui, &response).or(pointed.map(|at| {
             let place = (at - rect.min) / cell;
             let row = (place.y as usize).min(self.grid.rows() - 1);
             let col = (place.x as usize).min(self.grid.cols() - 1);
             row * self.grid.cols() + col
-        })
+        }))
+    }
+
+    fn cell_by_key(&self, ui: &Ui, response: &Response) -> Option<usize> {
+        if !response.has_focus() {
+            return None;
+        }
+        let arrows = EventFilter { horizontal_arrows: true, vertical_arrows: true, ..EventFilter::default() };
+        ui.memory_mut(|memory| memory.set_focus_lock_filter(response.id, arrows));
+        let presses = |key| ui.input(|input| input.num_presses(key));
+        let [up, down, left, right] =
+            [egui::Key::ArrowUp, egui::Key::ArrowDown, egui::Key::ArrowLeft, egui::Key::ArrowRight].map(presses);
+        let (row, col) = self.grid.cell(self.marked.filter(|&state| state < self.grid.cells()).unwrap_or(0));
+        let row = (row as usize + down).min(self.grid.rows() - 1).saturating_sub(up);
+        let col = (col as usize + right).min(self.grid.cols() - 1).saturating_sub(left);
+        (up + down + left + right > 0).then_some(row * self.grid.cols() + col)
     }
 
     fn cell_rect(&self, rect: Rect, cell: Vec2, state: usize) -> Rect {

@@ -4,6 +4,7 @@ use egui::{Frame, Grid, Modal, RichText, Ui};
 
 use super::commands;
 use super::theme::{self, Palette};
+use super::widgets::{dialog, heading};
 
 const PARAGRAPHS: [(&str, &str); 5] = [
     (
@@ -41,7 +42,8 @@ pub fn show(ui: &mut Ui) -> bool {
     let frame = Frame::popup(ui.style()).inner_margin(20);
     let response = Modal::new(egui::Id::unique("help")).frame(frame).show(ui.ctx(), |ui| {
         ui.set_max_width(520.0_f32.min(ui.ctx().content_rect().width() - 48.0));
-        ui.label(RichText::new("ape-lab").heading());
+        dialog(ui, "What is this?");
+        heading(ui, 2, RichText::new("ape-lab").heading());
         ui.label(
             RichText::new("Policies that reach the goal and cannot be cloned. Or can they?")
                 .color(Palette::of(ui).muted),
@@ -49,11 +51,11 @@ pub fn show(ui: &mut Ui) -> bool {
         egui::ScrollArea::vertical().max_height(ui.ctx().content_rect().height() - 200.0).show(ui, |ui| {
             for (title, text) in PARAGRAPHS {
                 ui.add_space(6.0);
-                ui.label(RichText::new(title).text_style(theme::strong()));
+                heading(ui, 3, RichText::new(title).text_style(theme::strong()));
                 ui.label(text);
             }
             ui.add_space(6.0);
-            ui.label(RichText::new("Keys").text_style(theme::strong()));
+            heading(ui, 3, RichText::new("Keys").text_style(theme::strong()));
             Grid::new("keys").num_columns(4).spacing([10.0, 2.0]).show(ui, |ui| {
                 for (index, (key, title)) in commands::shortcuts().enumerate() {
                     ui.label(RichText::new(key).text_style(theme::strong()));

@@ -1,10 +1,12 @@
 //! One cell in every panel: hitting time, π(·|s) and p(c|s) as numbers. A column a panel.
 
-use egui::{Grid as Table, RichText, ScrollArea, Ui};
+use egui::{Grid as Table, Id, RichText, Role, ScrollArea, Ui};
 
 use super::numbers;
 use super::panels::Panel;
+use super::table;
 use super::theme::{self, Palette};
+use super::widgets::heading;
 use crate::mdp::{Action, Grid};
 
 /// Height that the table needs for so many experts.
@@ -29,7 +31,8 @@ pub fn show(ui: &mut Ui, panels: &[Panel], grid: &Grid, cell: Option<usize>) {
         () if state == grid.goal() => ", the goal",
         () => "",
     };
-    ui.label(RichText::new(format!("Cell in row {row}, column {col}{kind}")).text_style(theme::strong()));
+    let title = format!("Cell in row {row}, column {col}{kind}");
+    heading(ui, 2, RichText::new(title).text_style(theme::strong()));
     if !kind.is_empty() {
         ui.label(quiet("No policy acts here."));
         return;
@@ -40,34 +43,44 @@ pub fn show(ui: &mut Ui, panels: &[Panel], grid: &Grid, cell: Option<usize>) {
         panels.iter().filter_map(|(panel, _)| panel.clone).map(|(_, p)| p.len() / grid.cells()).max().unwrap_or(0);
     ScrollArea::both().auto_shrink([false, true]).min_scrolled_height(height(experts)).show(ui, |ui| {
         Table::new("inspector").striped(false).spacing([8.0, 3.0]).min_col_width(0.0).show(ui, |ui| {
-            ui.label("");
+            table::describe(ui, "The cell in every panel");
+            let label = |ui: &mut Ui, row: Id, role: Role, text: RichText| {
+                table::cell(ui, row, role, |ui| ui.label(text));
+            };
+            let head = table::row(ui);
+            label(ui, head, Role::Cell, RichText::new(""));
             for (panel, _) in &panels {
-                ui.label(RichText::new(&panel.short).small().strong());
+                label(ui, head, Role::ColumnHeader, RichText::new(&panel.short).small().strong());
             }
             ui.end_row();
-            ui.label(quiet("steps"));
+            let row = table::row(ui);
+            label(ui, row, Role::RowHeader, quiet("steps"));
             for (_, policy) in &panels {
-                ui.label(RichText::new(numbers::steps(f64::from(policy.hitting_time[state]))).small());
+                let steps = numbers::steps(f64::from(policy.hitting_time[state]));
+                label(ui, row, Role::Cell, RichText::new(steps).small());
             }
             ui.end_row();
-            let probability = |ui: &mut Ui, p: f32| {
+            let probability = |p: f32| {
                 let text = RichText::new(numbers::decimal(f64::from(p), 2)).small();
-                ui.label(if p < 0.005 { text.color(palette.muted) } else { text });
+                if p < 0.005 { text.color(palette.muted) } else { text }
             };
             for action in Action::ALL {
-                ui.label(quiet(action.name()));
+                let row = table::row(ui);
+                label(ui, row, Role::RowHeader, quiet(action.name()));
                 for (_, policy) in &panels {
-                    probability(ui, policy.policy[state][action as usize]);
+                    label(ui, row, Role::Cell, probability(policy.policy[state][action as usize]));
                 }
                 ui.end_row();
             }
             for expert in 0..experts {
-                ui.label(quiet(&format!("p({}|s)", expert + 1)));
+                let row = table::row(ui);
+                label(ui, row, Role::RowHeader, quiet(&format!("p({}|s)", expert + 1)));
                 for (panel, _) in &panels {
-                    match panel.clone {
-                        Some((_, p)) => probability(ui, p[state * p.len() / grid.cells() + expert]),
-                        None => _ = ui.label(""),
-                    }
+                    let text = match panel.clone {
+                        Some((_, p)) => probability(p[state * p.len() / grid.cells() + expert]),
+                        None => RichText::new(""),
+                    };
+                    label(ui, row, Role::Cell, text);
                 }
                 ui.end_row();
             }

@@ -1,12 +1,13 @@
 //! The policies as a table of text: what the heatmaps show, for reading, searching and screen readers.
 
-use egui::{Frame, Label, Modal, RichText, ScrollArea, Ui};
+use egui::{Frame, Id, Label, Modal, RichText, Role, ScrollArea, Ui};
 
 use super::app::App;
 use super::numbers;
 use super::panels;
+use super::table::{self, row};
 use super::theme::{self, Palette};
-use super::widgets::choose_wrapped;
+use super::widgets::{choose_wrapped, dialog, heading};
 use crate::mdp::Action;
 
 /// Height of a line.
@@ -22,8 +23,9 @@ pub fn show(ui: &mut Ui, app: &mut App) {
     let frame = Frame::popup(ui.style()).inner_margin(16);
     let response = Modal::new(id).frame(frame).show(ui.ctx(), |ui| {
         let palette = Palette::of(ui);
+        dialog(ui, "Policies as a table");
         ui.set_width(640.0_f32.min(screen.x - 48.0));
-        ui.label(RichText::new("Policies as a table").heading());
+        heading(ui, 2, RichText::new("Policies as a table").heading());
         ui.horizontal_wrapped(|ui| {
             let options: Vec<(usize, &str, &str)> =
                 list.iter().enumerate().map(|(index, panel)| (index, &*panel.title, "Its table")).collect();
@@ -35,32 +37,41 @@ pub fn show(ui: &mut Ui, app: &mut App) {
         };
         let heads = ["row", "column", "steps"].into_iter().chain(Action::ALL.map(Action::name));
         let width = (ui.available_width() - 16.0) / 8.0;
-        let cell = |ui: &mut Ui, text: RichText| {
-            ui.add_sized([width - 4.0, ROW - 4.0], Label::new(text.small()).extend());
+        let cell = |ui: &mut Ui, row: Id, role: Role, text: RichText| {
+            let label = Label::new(text.small()).extend();
+            table::cell(ui, row, role, |ui| ui.add_sized([width - 4.0, ROW - 4.0], label));
         };
         ui.spacing_mut().item_spacing = egui::vec2(4.0, 0.0);
         ui.spacing_mut().interact_size.y = ROW;
-        ui.horizontal(|ui| heads.for_each(|head| cell(ui, RichText::new(head).text_style(theme::strong()))));
-        let states: Vec<usize> = (0..shown.grid.cells()).filter(|&state| !shown.grid.is_wall(state)).collect();
-        let area = ScrollArea::vertical().max_height(screen.y - 260.0).auto_shrink([false, true]);
-        area.show_rows(ui, ROW, states.len(), |ui, rows| {
-            for &state in &states[rows] {
-                let (row, col) = shown.grid.cell(state);
-                let steps = numbers::steps(f64::from(policy.hitting_time[state]));
-                ui.horizontal(|ui| {
-                    cell(ui, RichText::new(row.to_string()));
-                    cell(ui, RichText::new(col.to_string()));
-                    cell(ui, RichText::new(steps));
-                    if state == shown.grid.goal() {
-                        ui.label(RichText::new("the goal").small().color(palette.muted));
-                        return;
-                    }
-                    for p in policy.policy[state] {
-                        let text = RichText::new(numbers::decimal(f64::from(p), 3));
-                        cell(ui, if p < 0.0005 { text.color(palette.muted) } else { text });
-                    }
+        ui.scope(|ui| {
+            table::describe(ui, &list[chosen].title);
+            ui.horizontal(|ui| {
+                let row = row(ui);
+                heads.for_each(|head| {
+                    cell(ui, row, Role::ColumnHeader, RichText::new(head).text_style(theme::strong()))
                 });
-            }
+            });
+            let states: Vec<usize> = (0..shown.grid.cells()).filter(|&state| !shown.grid.is_wall(state)).collect();
+            let area = ScrollArea::vertical().max_height(screen.y - 260.0).auto_shrink([false, true]);
+            area.show_rows(ui, ROW, states.len(), |ui, rows| {
+                for &state in &states[rows] {
+                    let at = shown.grid.cell(state);
+                    let steps = numbers::steps(f64::from(policy.hitting_time[state]));
+                    ui.horizontal(|ui| {
+                        let row = row(ui);
+                        cell(ui, row, Role::RowHeader, RichText::new(at.0.to_string()));
+                        cell(ui, row, Role::RowHeader, RichText::new(at.1.to_string()));
+                        cell(ui, row, Role::Cell, RichText::new(steps));
+                        if state == shown.grid.goal() {
+                            return cell(ui, row, Role::Cell, RichText::new("the goal").color(palette.muted));
+                        }
+                        for p in policy.policy[state] {
+                            let text = RichText::new(numbers::decimal(f64::from(p), 3));
+                            cell(ui, row, Role::Cell, if p < 0.0005 { text.color(palette.muted) } else { text });
+                        }
+                    });
+                }
+            });
         });
         ui.add_space(8.0);
         ui.button("Close").clicked()

@@ -1,6 +1,7 @@
 //! A table of figures that sorts by any of its columns.
 
-use egui::{Color32, Grid, RichText, ScrollArea, Ui};
+use egui::accesskit::SortDirection;
+use egui::{Color32, Grid, Id, RichText, Role, ScrollArea, Ui, UiBuilder};
 
 use super::theme::Palette;
 
@@ -57,6 +58,8 @@ pub fn table(ui: &mut Ui, id: &'static str, columns: &[Column], mut rows: Vec<Ve
         ui.spacing_mut().button_padding.x = 0.0;
         ui.spacing_mut().interact_size.y = 18.0;
         Grid::new(id).striped(true).spacing([14.0, 4.0]).min_col_width(0.0).show(ui, |ui| {
+            describe(ui, id);
+            let head = row(ui);
             for (index, column) in columns.iter().enumerate() {
                 let mark = match index == by {
                     true if is_falling => " ↓",
@@ -64,24 +67,50 @@ pub fn table(ui: &mut Ui, id: &'static str, columns: &[Column], mut rows: Vec<Ve
                     false => "",
                 };
                 let text = RichText::new(format!("{}{mark}", column.title)).small().strong();
-                let response = ui.add(egui::Button::new(text).frame(false));
-                let response = response.accessible_name(format!("Sort by {}", column.title));
+                let response = cell(ui, head, Role::ColumnHeader, |ui| {
+                    if index == by {
+                        let order = if is_falling { SortDirection::Descending } else { SortDirection::Ascending };
+                        ui.ctx().accesskit_node_builder(ui.unique_id(), |node| node.set_sort_direction(order));
+                    }
+                    let response = ui.add(egui::Button::new(text).frame(false));
+                    response.accessible_name(format!("Sort by {}", column.title))
+                });
                 if response.on_hover_text(&column.help).clicked() {
                     (by, is_falling) = (index, index == by && !is_falling);
                     ui.data_mut(|data| data.insert_temp(key, (by, is_falling)));
                 }
             }
             ui.end_row();
-            for row in rows {
-                for cell in row {
-                    let text = RichText::new(cell.text).small().color(cell.color.unwrap_or(palette.ink));
-                    let label = ui.add(egui::Label::new(text).extend());
-                    if !cell.hover.is_empty() {
-                        label.on_hover_text(cell.hover);
+            for figures in rows {
+                let row = row(ui);
+                for (index, figure) in figures.into_iter().enumerate() {
+                    let text = RichText::new(figure.text).small().color(figure.color.unwrap_or(palette.ink));
+                    let role = if index == 0 { Role::RowHeader } else { Role::Cell };
+                    let label = cell(ui, row, role, |ui| ui.add(egui::Label::new(text).extend()));
+                    if !figure.hover.is_empty() {
+                        label.on_hover_text(figure.hover);
                     }
                 }
                 ui.end_row();
             }
         });
     });
+}
+
+/// Says that what is in `ui` is a table, and what it is called.
+pub fn describe(ui: &Ui, name: &str) {
+    ui.ctx().accesskit_node_builder(ui.unique_id(), |node| {
+        node.set_role(Role::Table);
+        node.set_label(name);
+    });
+}
+
+/// A row of the table that `ui` is, for assistive technology: it takes no room, its cells name it.
+pub fn row(ui: &mut Ui) -> Id {
+    ui.new_child(UiBuilder::new().accessibility_role(Role::Row)).unique_id()
+}
+
+/// A cell of a row.
+pub fn cell<R>(ui: &mut Ui, row: Id, role: Role, add: impl FnOnce(&mut Ui) -> R) -> R {
+    ui.scope_builder(UiBuilder::new().accessibility_parent(row).accessibility_role(role), add).inner
 }

@@ -4,7 +4,7 @@ use egui::{Align, ComboBox, Layout, RichText, Slider, Ui};
 
 use super::app::App;
 use super::theme::{self, Palette};
-use super::widgets::{Icon, icon_button};
+use super::widgets::{Icon, heading, icon_button};
 use super::{commands, settings};
 use crate::experiment::PRESETS;
 use crate::lab::{Command, RunState};
@@ -16,7 +16,7 @@ pub const SPEEDS: [Option<f32>; 9] =
 pub fn show(ui: &mut Ui, app: &mut App) {
     if ui.available_width() < theme::NARROW {
         ui.horizontal(|ui| {
-            ui.label(RichText::new("ape-lab").heading());
+            heading(ui, 1, RichText::new("ape-lab").heading());
             at_the_right(ui, app);
         });
         ui.horizontal(|ui| {
@@ -26,7 +26,7 @@ pub fn show(ui: &mut Ui, app: &mut App) {
     } else {
         ui.spacing_mut().interact_size.y = 34.0;
         ui.horizontal(|ui| {
-            ui.label(RichText::new("ape-lab").heading());
+            heading(ui, 1, RichText::new("ape-lab").heading());
             presets(ui, app);
             transport(ui, app);
             speed(ui, app);

@@ -144,7 +144,25 @@ pub fn icon_button(ui: &mut Ui, icon: Icon, name: &str, is_main: bool) -> Respon
 /// A heading above a group of controls.
 pub fn section(ui: &mut Ui, title: &str) {
     ui.add_space(4.0);
-    ui.label(egui::RichText::new(title).text_style(theme::strong()));
+    heading(ui, 2, egui::RichText::new(title).text_style(theme::strong()));
+}
+
+/// Text that assistive technology can jump to. The page itself is level 1, its parts are level 2.
+pub fn heading(ui: &mut Ui, level: usize, text: egui::RichText) {
+    let response = ui.label(text);
+    ui.ctx().accesskit_node_builder(response.id, |node| {
+        node.set_role(Role::Heading);
+        node.set_level(level);
+    });
+}
+
+/// Says that `ui` is a dialog over the page, and what it is called.
+pub fn dialog(ui: &Ui, name: &str) {
+    ui.ctx().accesskit_node_builder(ui.unique_id(), |node| {
+        node.set_role(Role::Dialog);
+        node.set_label(name);
+        node.set_modal();
+    });
 }
 
 /// A row of words of which one is chosen.

@@ -1,43 +1,64 @@
-//! The mirror: the page's widgets as transparent elements over the canvas, with role, name and value.
+//! The mirror: the page's widgets as unseen elements over the canvas, with role, name and value.
 //!
 //! eframe throws egui's accessibility tree away in a browser. This plugin takes it and keeps one element a
-//! widget under `#mirror`, where it lies on the screen, for assistive technology and for tests.
+//! widget under `#mirror`, where it lies on the screen, for assistive technology and for tests. What is done to
+//! the elements comes back through [`super::hands`].
 
 use std::cell::RefCell;
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
-use egui::accesskit::{Node, NodeId, Role, Toggled, TreeUpdate};
-use egui::{Context, FullOutput, Plugin};
+use egui::accesskit::{Live, Node, NodeId, Role, TreeUpdate};
+use egui::{Context, FullOutput, Plugin, RawInput};
 use web_sys::Element;
+
+use super::aria::{self, Kind, Relations, Said};
+use super::hands::Hands;
 
 thread_local! {
     /// Elements cannot be sent between threads, as plugins must be: they live here, on the page's only one.
-    static MIRROR: RefCell<Option<Elements>> = const { RefCell::new(None) };
+    static MIRROR: RefCell<Option<(Elements, Hands)>> = const { RefCell::new(None) };
 }
 
+/// The elements of the last frame.
 struct Elements {
     parent: Element,
-    /// The elements of the last frame, by widget.
-    shown: HashMap<NodeId, (Element, Mirrored)>,
-    /// Their order in the document.
-    order: Vec<NodeId>,
+    shown: HashMap<NodeId, Shown>,
+    /// What each container holds, in order; `None` is the mirror itself.
+    children: HashMap<Option<NodeId>, Vec<NodeId>>,
+    announcer: Announcer,
 }
 
-/// What is said of one widget: attributes, text and place.
-#[derive(Clone, Default, PartialEq)]
-struct Mirrored {
-    attributes: Vec<(&'static str, String)>,
-    text: String,
-    style: String,
+/// An element, and what it was made of: as long as that stays, it is not touched.
+struct Shown {
+    element: Element,
+    kind: Kind,
+    node: Node,
+    relations: Relations,
+    zoom: f32,
+    said: Said,
+}
+
+/// The live region: speaks what comes to rest, at most once a second.
+struct Announcer {
+    element: Element,
+    /// What is live on the page, each with its words.
+    live: HashMap<NodeId, String>,
+    /// What is still to be said.
+    waiting: Vec<(NodeId, String)>,
+    /// When it last spoke, in seconds.
+    spoke: f64,
 }
 
 /// The plugin.
 pub struct Mirror(());
 
 impl Mirror {
-    /// `parent`: the empty element that will hold the mirror.
-    pub fn new(parent: Element) -> Mirror {
-        MIRROR.set(Some(Elements { parent, shown: HashMap::new(), order: Vec::new() }));
+    /// `parent`: the empty element that will hold the mirror; `announcer`: the live region.
+    pub fn new(parent: Element, announcer: Element, hands: Hands) -> Mirror {
+        let announcer =
+            Announcer { element: announcer, live: HashMap::new(), waiting: Vec::new(), spoke: f64::NEG_INFINITY };
+        let elements = Elements { parent, shown: HashMap::new(), children: HashMap::new(), announcer };
+        MIRROR.set(Some((elements, hands)));
         Mirror(())
     }
 }
@@ -49,147 +70,178 @@ impl Plugin for Mirror {
 
     fn setup(&mut self, ctx: &Context) {
         ctx.enable_accesskit();
+        MIRROR.with_borrow_mut(|mirror| {
+            if let Some((elements, hands)) = mirror {
+                hands.listen(&elements.parent, ctx);
+            }
+        });
+    }
+
+    fn input_hook(&mut self, _ctx: &Context, input: &mut RawInput) {
+        MIRROR.with_borrow_mut(|mirror| {
+            if let Some((_, hands)) = mirror {
+                hands.give(input);
+            }
+        });
     }
 
     fn output_hook(&mut self, ctx: &Context, output: &mut FullOutput) {
-        let Some(update) = &output.platform_output.accesskit_update else { return };
-        let zoom = ctx.zoom_factor();
-        MIRROR.with_borrow_mut(|elements| {
-            if let Some(elements) = elements {
-                elements.show(update, zoom);
+        let Some(update) = output.platform_output.accesskit_update.take() else { return };
+        MIRROR.with_borrow_mut(|mirror| {
+            if let Some((elements, hands)) = mirror {
+                let order = elements.show(&update, ctx);
+                hands.follow(ctx, &update, &order);
             }
         });
     }
 }
 
 impl Elements {
-    /// Makes the document say what the tree says; what has not changed is not touched.
-    fn show(&mut self, update: &TreeUpdate, zoom: f32) {
+    /// Makes the document say what the tree says; what has not changed is not touched. Returns the tree's nodes, in
+    /// order.
+    fn show(&mut self, update: &TreeUpdate, ctx: &Context) -> Vec<NodeId> {
+        let zoom = ctx.zoom_factor();
         let nodes: HashMap<NodeId, &Node> = update.nodes.iter().map(|(id, node)| (*id, node)).collect();
         let root = update.tree.as_ref().map_or(update.focus, |tree| tree.root);
         let mut order = Vec::with_capacity(nodes.len());
-        let mut stack = vec![root];
-        while let Some(id) = stack.pop() {
-            let Some(node) = nodes.get(&id) else { continue };
-            stack.extend(node.children().iter().rev());
-            if let Some(mirrored) = mirrored(node, &nodes, zoom) {
-                order.push(id);
-                self.show_widget(id, mirrored, id == update.focus);
-            }
-        }
-        if order != self.order {
-            let stay: std::collections::HashSet<_> = order.iter().copied().collect();
-            self.shown.retain(|id, (element, _)| {
-                let stays = stay.contains(id);
-                if !stays {
-                    element.remove();
+        let mut children = HashMap::from([(None, Vec::new())]);
+        let mut owners = HashMap::new();
+        let mut live = HashMap::new();
+        let mut stack = vec![(root, None)];
+        while let Some((id, mut parent)) = stack.pop() {
+            let Some(&node) = nodes.get(&id) else { continue };
+            let popup = if node.role() == Role::ComboBox { list_below(node, &nodes) } else { None };
+            owners.extend(popup.map(|popup| (popup, id)));
+            let named_by = node.labelled_by().iter().chain(owners.get(&id));
+            let names: Vec<&str> = named_by.filter_map(|id| nodes.get(id)).map(|node| name(node)).collect();
+            let relations = Relations { has_focus: id == update.focus, named_by: names.join(" "), popup };
+            order.push(id);
+            if let Some(kind) = aria::kind(node, &relations) {
+                children.entry(parent).or_insert_with(Vec::new).push(id);
+                if matches!(kind, Kind::Container(_)) {
+                    parent = Some(id);
+                    children.entry(parent).or_default();
                 }
-                stays
-            });
-            for id in &order {
-                // Appending what is there already moves it to the end: all of them in order.
-                let _ = self.parent.append_child(&self.shown[id].0);
+                if node.live() == Some(Live::Polite) {
+                    live.insert(id, aria::text(node).to_owned());
+                }
+                self.show_node(id, kind, node, relations, zoom);
             }
-            self.order = order;
+            stack.extend(node.children().iter().rev().map(|child| (*child, parent)));
         }
+        if children != self.children {
+            self.arrange(children);
+        }
+        self.announcer.hear(live, ctx);
+        order
     }
 
-    fn show_widget(&mut self, id: NodeId, mut mirrored: Mirrored, has_focus: bool) {
-        if has_focus {
-            mirrored.attributes.push(("data-focus", "true".to_owned()));
-        }
-        let (element, old) = self.shown.entry(id).or_insert_with(|| {
-            let document = self.parent.owner_document().expect("the mirror is in a document");
-            let element = document.create_element("div").expect("div is a valid name");
-            (element, Mirrored::default())
-        });
-        if *old == mirrored {
+    fn show_node(&mut self, id: NodeId, kind: Kind, node: &Node, relations: Relations, zoom: f32) {
+        let old = self.shown.get(&id);
+        if old.is_some_and(|old| old.node == *node && old.relations == relations && old.zoom == zoom) {
             return;
         }
+        // Text and children do not mix: what becomes a container, or ceases to be one, is a new element.
+        let is_container = |kind| matches!(kind, Kind::Container(_));
+        let old = self.shown.remove(&id).filter(|old| {
+            let stays = is_container(old.kind) == is_container(kind);
+            if !stays {
+                old.element.remove();
+                self.children.clear();
+            }
+            stays
+        });
+        let said = aria::said(id, kind, node, &relations, zoom);
+        let (element, old) = old.map_or_else(
+            || {
+                let document = self.parent.owner_document().expect("the mirror is in a document");
+                (document.create_element("div").expect("div is a valid name"), Said::default())
+            },
+            |old| (old.element, old.said),
+        );
         for (name, _) in &old.attributes {
-            if mirrored.attributes.iter().all(|(new, _)| new != name) {
+            if said.attributes.iter().all(|(new, _)| new != name) {
                 let _ = element.remove_attribute(name);
             }
         }
-        for (name, value) in &mirrored.attributes {
-            let _ = element.set_attribute(name, value);
+        for attribute in &said.attributes {
+            if !old.attributes.contains(attribute) {
+                let _ = element.set_attribute(attribute.0, &attribute.1);
+            }
         }
-        if old.text != mirrored.text {
-            element.set_text_content(Some(&mirrored.text));
+        if old.text != said.text {
+            element.set_text_content(Some(&said.text));
         }
-        if old.style != mirrored.style {
-            let _ = element.set_attribute("style", &mirrored.style);
+        self.shown.insert(id, Shown { element, kind, node: node.clone(), relations, zoom, said });
+    }
+
+    /// Puts every element where it belongs; those that are there already stay.
+    fn arrange(&mut self, children: HashMap<Option<NodeId>, Vec<NodeId>>) {
+        let stay: HashSet<_> = children.values().flatten().copied().collect();
+        self.shown.retain(|id, shown| {
+            let stays = stay.contains(id);
+            if !stays {
+                shown.element.remove();
+            }
+            stays
+        });
+        for (container, inside) in &children {
+            if self.children.get(container) == Some(inside) {
+                continue;
+            }
+            let parent = container.map_or(&self.parent, |id| &self.shown[&id].element);
+            let mut next = parent.first_element_child();
+            for id in inside {
+                let element = &self.shown[id].element;
+                if next.as_ref() == Some(element) {
+                    next = element.next_element_sibling();
+                } else {
+                    let _ = parent.insert_before(element, next.as_deref());
+                }
+            }
         }
-        *old = mirrored;
+        self.children = children;
     }
 }
 
-/// The ARIA role of a widget; `None` for what only groups or decorates.
-fn aria(role: Role) -> Option<&'static str> {
-    Some(match role {
-        Role::Label => "",
-        Role::Button | Role::DefaultButton => "button",
-        Role::CheckBox => "checkbox",
-        Role::RadioButton => "radio",
-        Role::Slider => "slider",
-        Role::SpinButton => "spinbutton",
-        Role::ComboBox => "combobox",
-        Role::TextInput | Role::MultilineTextInput => "textbox",
-        Role::Link => "link",
-        Role::Image => "img",
-        Role::ProgressIndicator => "progressbar",
-        Role::Status => "status",
-        Role::Alert => "alert",
-        Role::ListBoxOption => "option",
-        _ => return None,
-    })
-}
-
-fn mirrored(node: &Node, nodes: &HashMap<NodeId, &Node>, zoom: f32) -> Option<Mirrored> {
-    let role = aria(node.role()).filter(|_| !node.is_hidden())?;
-    let bounds = node.bounds()?;
-    let mut attributes = Vec::new();
-    let mut put = |name, value: String| attributes.push((name, value));
-    if !role.is_empty() {
-        put("role", role.to_owned());
-    }
-    let named_by = node.labelled_by().iter().filter_map(|id| nodes.get(id)?.value()).collect::<Vec<_>>().join(" ");
-    let label = node.label().map(str::to_owned).filter(|label| !label.is_empty()).unwrap_or(named_by);
-    let value = node.value().unwrap_or_default();
-    let text = match node.role() {
-        Role::Label | Role::Status | Role::Alert => [&label, value].into_iter().find(|t| !t.is_empty())?.to_owned(),
-        Role::ComboBox | Role::TextInput | Role::MultilineTextInput => value.to_owned(),
-        _ => String::new(),
-    };
-    if !label.is_empty() && node.role() != Role::Label {
-        put("aria-label", label);
-    }
-    if let Some(now) = node.numeric_value() {
-        put("aria-valuenow", now.to_string());
-        if !value.is_empty() {
-            put("aria-valuetext", value.to_owned());
+impl Announcer {
+    /// Takes in what is live now; what is new among it is said, the latest of each node.
+    fn hear(&mut self, live: HashMap<NodeId, String>, ctx: &Context) {
+        for (id, words) in &live {
+            if self.live.get(id) != Some(words) {
+                self.waiting.retain(|(waiting, _)| waiting != id);
+                self.waiting.push((*id, words.clone()));
+            }
+        }
+        self.waiting.retain(|(id, _)| live.contains_key(id));
+        self.live = live;
+        if self.waiting.is_empty() {
+            return;
+        }
+        let now = ctx.input(|input| input.time);
+        if now - self.spoke >= 1.0 {
+            let words: Vec<String> = self.waiting.drain(..).map(|(_, words)| words).collect();
+            self.element.set_text_content(Some(&words.join(" ")));
+            self.spoke = now;
+        } else {
+            ctx.request_repaint_after_secs((1.0 - (now - self.spoke)) as f32);
         }
     }
-    if let Some(low) = node.min_numeric_value().filter(|low| low.is_finite()) {
-        put("aria-valuemin", low.to_string());
+}
+
+fn name(node: &Node) -> &str {
+    node.label().or(node.value()).unwrap_or_default()
+}
+
+/// The list that a combobox has opened.
+fn list_below(node: &Node, nodes: &HashMap<NodeId, &Node>) -> Option<NodeId> {
+    let mut below = node.children().to_vec();
+    while let Some(id) = below.pop() {
+        let Some(node) = nodes.get(&id) else { continue };
+        if node.role() == Role::ListBox {
+            return Some(id);
+        }
+        below.extend(node.children());
     }
-    if let Some(high) = node.max_numeric_value().filter(|high| high.is_finite()) {
-        put("aria-valuemax", high.to_string());
-    }
-    if let Some(toggled) = node.toggled() {
-        let name = if matches!(role, "checkbox" | "radio") { "aria-checked" } else { "aria-pressed" };
-        put(name, (toggled == Toggled::True).to_string());
-    }
-    if node.is_disabled() {
-        put("aria-disabled", "true".to_owned());
-    }
-    let zoom = f64::from(zoom);
-    let style = format!(
-        "left:{:.0}px;top:{:.0}px;width:{:.0}px;height:{:.0}px",
-        bounds.x0 * zoom,
-        bounds.y0 * zoom,
-        (bounds.x1 - bounds.x0) * zoom,
-        (bounds.y1 - bounds.y0) * zoom
-    );
-    Some(Mirrored { attributes, text, style })
+    None
 }

@@ -1,7 +1,11 @@
 //! What only a browser has: the workers, files, and the mirror of the page for assistive technology. Nothing here draws, trains or decides.
 
 #[cfg(feature = "page")]
+mod aria;
+#[cfg(feature = "page")]
 mod files;
+#[cfg(feature = "page")]
+mod hands;
 #[cfg(feature = "page")]
 mod mirror;
 #[cfg(feature = "page")]

@@ -5,6 +5,7 @@ use wasm_bindgen::prelude::*;
 use web_sys::HtmlCanvasElement;
 
 use super::files::Files;
+use super::hands::Hands;
 use super::mirror::Mirror;
 use super::worker::{WorkerLink, worker_pool};
 use crate::ui::App;
@@ -42,10 +43,12 @@ async fn run() -> Result<(), String> {
     let _ = newest_version().await;
     let canvas: HtmlCanvasElement =
         element("canvas")?.dyn_into().map_err(|_| "The element \"canvas\" is no canvas.")?;
-    let mirror = Mirror::new(element("mirror")?);
+    let end = |id: &str| element(id)?.dyn_into().map_err(|_| format!("The element {id:?} cannot have the focus."));
+    let hands = Hands::new(canvas.clone().into(), end("start")?, end("end")?);
+    let mirror = Mirror::new(element("mirror")?, element("announcer")?, hands);
     WebRunner::new()
         .start(
-            canvas,
+            canvas.clone(),
             WebOptions::default(),
             Box::new(|cc| {
                 cc.egui_ctx.add_plugin(mirror);
@@ -64,6 +67,14 @@ async fn run() -> Result<(), String> {
         )
         .await
         .map_err(|error| format!("The page could not be drawn ({error:?})."))?;
+    // eframe's field for typing gets the focus from the canvas: Tab must not stop at it too.
+    if let Some(field) = canvas.next_element_sibling() {
+        let names = [("tabindex", "-1"), ("aria-label", "Text")];
+        names
+            .iter()
+            .try_for_each(|(name, value)| field.set_attribute(name, value))
+            .map_err(|error| format!("{error:?}"))?;
+    }
     element("message")?.set_attribute("hidden", "").map_err(|error| format!("{error:?}"))?;
     js_sys::Reflect::set(&window, &"pageHasStarted".into(), &true.into()).map_err(|error| format!("{error:?}"))?;
     Ok(())

@@ -37,7 +37,7 @@ export async function serve(folder = DIST) {
 }
 
 /** Chromium as it runs on machines without a display, also as root. */
-export function launch() {
+export function launch(...more) {
   return chromium.launch({
     executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium",
     args: [
@@ -48,6 +48,7 @@ export function launch() {
       "--no-first-run",
       "--use-angle=swiftshader",
       "--enable-unsafe-swiftshader",
+      ...more,
     ],
   });
 }

@@ -6,12 +6,14 @@ pub mod race;
 pub mod sweep;
 pub mod table1;
 
+use egui::accesskit::Live;
 use egui::{ProgressBar, RichText, Ui};
 
 use super::app::App;
 use super::numbers;
 use super::table::Cell;
 use super::theme::Palette;
+use super::widgets::heading;
 use crate::attack::AttackerChoice;
 use crate::experiment::{Outcome, Summary, Task};
 use crate::lab::{Exported, Pool, TaskEvent, TaskId};
@@ -87,7 +89,7 @@ impl Batch {
                 _ if self.is_complete() => format!("done in {seconds:.1} s"),
                 count => format!("stopped after {seconds:.1} s with {count} of {} done", self.tasks.len()),
             };
-            status(ui, &text);
+            status(ui, &text, Live::Polite);
             return;
         }
         ui.horizontal(|ui| {
@@ -107,15 +109,18 @@ impl Batch {
             }
             let bar = ProgressBar::new(done as f32).desired_width(160.0).desired_height(10.0);
             ui.add(bar.fill(palette.accent)).accessible_name("Progress");
-            status(ui, &text);
+            status(ui, &text, Live::Off);
         });
         ui.ctx().request_repaint_after_secs(0.25);
     }
 }
 
-fn status(ui: &mut Ui, text: &str) {
+fn status(ui: &mut Ui, text: &str, live: Live) {
     let label = ui.label(RichText::new(text).small().color(Palette::of(ui).muted));
-    ui.ctx().accesskit_node_builder(label.id, |node| node.set_role(egui::Role::Status));
+    ui.ctx().accesskit_node_builder(label.id, |node| {
+        node.set_role(egui::Role::Status);
+        node.set_live(live);
+    });
 }
 
 /// What an ensemble from the session is called in a sentence.
@@ -156,7 +161,7 @@ fn exports(ui: &mut Ui, app: &mut App, name: &str, csv: impl Fn() -> String, jso
 
 /// The first lines of a tab: what it shows.
 fn introduce(ui: &mut Ui, title: &str, text: &str) {
-    ui.label(RichText::new(title).heading());
+    heading(ui, 2, RichText::new(title).heading());
     ui.label(RichText::new(text).color(Palette::of(ui).muted));
     ui.add_space(4.0);
 }

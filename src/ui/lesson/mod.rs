@@ -12,6 +12,7 @@ pub use steps::STEPS;
 use super::app::{App, Tab};
 use super::math::math;
 use super::theme::{self, Palette};
+use super::widgets::heading;
 use crate::attack::AttackerChoice;
 use crate::experiment::{PRESETS, Setup};
 use crate::mdp::RETURN_KINDS;
@@ -79,8 +80,7 @@ pub fn show(ui: &mut Ui, app: &mut App) {
         }
     });
     let Step { title, blocks, .. } = &STEPS[step];
-    let heading = ui.label(RichText::new(*title).heading());
-    ui.ctx().accesskit_node_builder(heading.id, |node| node.set_role(egui::Role::Heading));
+    heading(ui, 2, RichText::new(*title).heading());
     for block in *blocks {
         match block {
             Block::Text(text) => _ = ui.add(Label::new(*text).wrap()),

@@ -1,0 +1,205 @@
+// The page by keyboard and by screen reader: what assistive technology finds in the mirror of the page, and what it
+// can do there. The mouse is not used.
+import assert from "node:assert/strict";
+import { fileURLToPath } from "node:url";
+import { after, before, test } from "node:test";
+import { launch, open, serve } from "./browser.mjs";
+
+const AXE = fileURLToPath(new URL("./node_modules/axe-core/axe.min.js", import.meta.url));
+const PATIENCE = { timeout: 60_000 };
+
+let browser, site;
+before(async () => {
+  site = await serve();
+  browser = await launch();
+});
+after(async () => {
+  await browser?.close();
+  site?.close();
+});
+
+const trained = (page) => page.getByRole("status").filter({ hasText: /^trained/ }).waitFor(PATIENCE);
+const widget = (page, role, name) => page.getByRole(role, { name, exact: true });
+
+/** What a screen reader does to activate an element. */
+const activate = (locator) => locator.evaluate((element) => element.click());
+
+/** Polls until a promise satisfies a condition. */
+async function until(promise, condition) {
+  let value;
+  for (let tries = 0; tries < 200; tries++) {
+    value = await promise();
+    if (condition(value)) return value;
+    await new Promise((resolve) => setTimeout(resolve, 50));
+  }
+  assert.fail(`waited for 10 seconds: ${JSON.stringify(value)}`);
+}
+
+/** Presses a key, and gives the page time to draw. */
+async function press(page, key) {
+  await page.keyboard.press(key);
+  await page.waitForTimeout(80);
+}
+
+/** The id that the canvas says has the focus, or that of the element which has it. */
+const focused = (page) =>
+  page.evaluate(() => {
+    const active = document.activeElement;
+    const canvas = document.getElementById("canvas");
+    // Or the field beside it, into which one types.
+    return [canvas, canvas.nextElementSibling].includes(active) ? canvas.getAttribute("aria-activedescendant") : active.id;
+  });
+
+test("axe finds nothing to object to", async () => {
+  const { page, close } = await open(browser, site.address);
+  await trained(page);
+  await page.addScriptTag({ path: AXE });
+  const check = async (place) => {
+    const { violations } = await page.evaluate(() => axe.run(document, { resultTypes: ["violations"] }));
+    const found = violations.map(({ id, help, nodes }) => ({ id, help, nodes: nodes.slice(0, 3).map((node) => node.html) }));
+    assert.deepEqual(found, [], place);
+  };
+  await check("start");
+  await activate(widget(page, "combobox", "Preset"));
+  await page.getByRole("dialog", { name: "Preset" }).getByRole("button", { name: "Trap", exact: true }).waitFor(PATIENCE);
+  assert.equal(await widget(page, "combobox", "Preset").getAttribute("aria-expanded"), "true");
+  await check("preset menu");
+  await press(page, "Escape");
+  await until(() => widget(page, "combobox", "Preset").getAttribute("aria-expanded"), (is) => is === "false");
+
+  await activate(widget(page, "button", "What is this?"));
+  await page.getByRole("dialog", { name: "What is this?" }).getByRole("heading", { name: "What to try" }).waitFor(PATIENCE);
+  await check("help");
+  await activate(widget(page, "button", "Close"));
+  await until(() => page.getByRole("dialog").count(), (count) => count === 0);
+
+  await activate(widget(page, "button", "Advanced"));
+  await until(() => widget(page, "button", "Advanced").getAttribute("aria-expanded"), (is) => is === "true");
+  await check("advanced settings");
+  for (const tab of ["β sweep", "Table 1", "Attack bench"]) {
+    await activate(widget(page, "radio", `Tab: ${tab}`));
+    await page.getByRole("heading", { level: 2, name: new RegExp(tab === "β sweep" ? "β" : tab) }).first().waitFor(PATIENCE);
+    await check(tab);
+  }
+  // The bench again, with its table.
+  await activate(widget(page, "button", "Attack the ensemble shown"));
+  await page.getByRole("status").filter({ hasText: /^done in/ }).waitFor({ timeout: 120_000 });
+  await check("bench, done");
+  await close();
+});
+
+test("Tab goes through every widget, leaves at both ends and comes back", async () => {
+  const { page, problems, close } = await open(browser, site.address);
+  await trained(page);
+  const all = await page.locator('#mirror [tabindex="-1"]').evaluateAll((found) => found.map((element) => element.id));
+  assert.ok(all.length > 30, String(all.length));
+  const met = [];
+  for (let tabs = 0; tabs < 120 && (await focused(page)) !== "end"; tabs++) {
+    await press(page, "Tab");
+    met.push(await focused(page));
+  }
+  assert.equal(met.pop(), "end");
+  assert.deepEqual(new Set(met), new Set(all));
+  assert.equal(met.length, all.length);
+  const last = met.at(-1);
+  // From the end back to the last, and on past the end out of the page.
+  await press(page, "Shift+Tab");
+  assert.equal(await until(() => focused(page), (id) => id === last), last);
+  await press(page, "Tab");
+  assert.equal(await focused(page), "end");
+  await press(page, "Tab");
+  assert.ok(!["canvas", "end"].includes(await page.evaluate(() => document.activeElement.id)));
+  // From the start in; backwards at the first out again.
+  await page.locator("#start").focus();
+  await press(page, "Tab");
+  assert.equal(await until(() => focused(page), (id) => id === met[0]), met[0]);
+  await press(page, "Tab");
+  assert.equal(await until(() => focused(page), (id) => id === met[1]), met[1]);
+  await press(page, "Shift+Tab");
+  await until(() => focused(page), (id) => id === met[0]);
+  await press(page, "Shift+Tab");
+  await until(() => focused(page), (id) => id === "start");
+  assert.deepEqual(problems, []);
+  await close();
+});
+
+test("β by keyboard; the canvas says which widget has the focus, and the result is announced once", async () => {
+  const { page, problems, close } = await open(browser, site.address);
+  await trained(page);
+  const announcer = page.locator("#announcer");
+  await until(() => announcer.textContent(), (words) => /reach the goal in/.test(words));
+  await page.evaluate(() => {
+    window.said = [];
+    const hear = () => window.said.push(document.getElementById("announcer").textContent);
+    new MutationObserver(hear).observe(document.getElementById("announcer"), { childList: true, characterData: true, subtree: true });
+  });
+  const slider = widget(page, "slider", "β");
+  const id = await slider.getAttribute("id");
+  for (let tabs = 0; tabs < 60 && (await focused(page)) !== id; tabs++) await press(page, "Tab");
+  assert.equal(await focused(page), id);
+  await press(page, "ArrowLeft");
+  await until(() => slider.getAttribute("aria-valuenow"), (now) => now === "0.59");
+  await page.waitForTimeout(300);
+  await trained(page);
+  await page.waitForTimeout(2500);
+  const said = await page.evaluate(() => window.said);
+  assert.equal(said.length, 1, JSON.stringify(said));
+  assert.match(said[0], /reach the goal in/);
+  assert.deepEqual(problems, []);
+  await close();
+});
+
+test("a screen reader activates, focuses and moves the elements of the mirror", async () => {
+  const { page, problems, close } = await open(browser, site.address);
+  await trained(page);
+  await activate(widget(page, "button", "Back to the start"));
+  await page.getByRole("status").filter({ hasText: /^paused at update 0 / }).waitFor(PATIENCE);
+
+  // The focus goes on to the canvas, and its keys to the widget.
+  const speed = widget(page, "slider", "Speed");
+  await speed.focus();
+  assert.equal(await page.evaluate(() => document.activeElement.id), "canvas");
+  await until(() => focused(page), async (id) => id === (await speed.getAttribute("id")));
+  await press(page, "ArrowRight");
+  await until(() => speed.getAttribute("aria-valuenow"), (now) => now === "6");
+  // What a swipe up on a touch screen comes to.
+  await speed.evaluate((element) => element.dispatchEvent(new KeyboardEvent("keydown", { key: "ArrowUp", bubbles: true })));
+  await until(() => speed.getAttribute("aria-valuenow"), (now) => now === "7");
+  await speed.evaluate((element) => element.dispatchEvent(new KeyboardEvent("keydown", { key: "Home", bubbles: true })));
+  await until(() => speed.getAttribute("aria-valuenow"), (now) => now === "0");
+
+  // Typing: eframe's field has the focus and the seed's name.
+  const seed = widget(page, "spinbutton", "Seed");
+  await seed.focus();
+  await until(() => page.evaluate(() => document.activeElement.tagName), (name) => name === "INPUT");
+  await page.keyboard.press("Control+A");
+  await page.keyboard.type("42");
+  await press(page, "Enter");
+  await until(() => seed.getAttribute("aria-valuenow"), (now) => now === "42");
+  assert.equal(await page.evaluate(() => document.querySelector("#canvas + input").getAttribute("aria-label")), "Seed");
+  assert.deepEqual(problems, []);
+  await close();
+});
+
+test("a cell's numbers are a table; everything lies where it is seen, two pixels to a CSS pixel too", async () => {
+  // Playwright's own scale factor is not that of the canvas.
+  const browser = await launch("--force-device-scale-factor=2", "--window-size=1280,900");
+  const { page } = await open(browser, site.address, { viewport: null });
+  assert.equal(await page.evaluate(() => devicePixelRatio), 2);
+  await trained(page);
+  const box = await page.getByRole("img", { name: /^Optimal/ }).boundingBox();
+  await page.mouse.move(box.x + box.width * 0.55, box.y + box.height * 0.35);
+  await page.getByRole("heading", { name: "Cell in row 3, column 5" }).waitFor(PATIENCE);
+  const table = page.getByRole("table", { name: "The cell in every panel" });
+  assert.equal(await table.getByRole("row").count(), 9);
+  // The same by keyboard: arrows move from cell to cell while a picture has the focus.
+  await page.mouse.move(5, 5);
+  await page.getByRole("img", { name: /^Expert 1/ }).focus();
+  await press(page, "ArrowDown");
+  await press(page, "ArrowLeft");
+  await page.getByRole("heading", { name: "Cell in row 4, column 4" }).waitFor(PATIENCE);
+  const row = table.getByRole("row").filter({ has: page.getByRole("rowheader", { name: "p(2|s)" }) });
+  assert.equal(await row.getByRole("cell").count(), 5);
+  assert.deepEqual(await table.getByRole("columnheader").allTextContents(), ["E1", "E2", "uniform", "occupancy", "optimal"]);
+  await browser.close();
+});
