@@ -192,21 +192,43 @@ fn it_trains_by_itself_and_shows_the_effect() {
 /// From a phone to a 4K screen every widget lies within the page's width.
 #[test]
 fn nothing_is_cut_off() {
-    for (width, height) in [(390.0, 844.0), (820.0, 1180.0), (1000.0, 700.0), (1280.0, 800.0), (3840.0, 2160.0)] {
+    let sizes = [(390.0, 844.0), (730.0, 1000.0), (800.0, 500.0), (1000.0, 700.0), (1280.0, 800.0), (3840.0, 2160.0)];
+    for (width, height) in sizes {
         let (mut page, _) = open(width, height);
+        let check = |page: &Page, place: &str| {
+            for node in page.root().children_recursive() {
+                let Some(bounds) = node.accesskit_node().bounding_box() else { continue };
+                let name = says(&node.accesskit_node()).unwrap_or_default();
+                if !name.is_empty() {
+                    let is_inside = bounds.x0 >= -0.5 && bounds.x1 <= f64::from(width) + 0.5;
+                    assert!(is_inside, "{width}, {place}: {name:?} {bounds:?}");
+                }
+            }
+        };
         for experts in ["2 experts", "8 experts"] {
             let node = page.get_by_role_and_label(Role::RadioButton, experts);
             node.click_accesskit();
             settle(&mut page);
-            let root = page.root();
-            for node in root.children_recursive() {
-                let Some(bounds) = node.accesskit_node().bounding_box() else { continue };
-                let name = says(&node.accesskit_node()).unwrap_or_default();
-                if !name.is_empty() {
-                    assert!(bounds.x0 >= -0.5 && bounds.x1 <= f64::from(width) + 0.5, "{width}: {name:?} {bounds:?}");
-                }
-            }
+            check(&page, experts);
         }
+        page.get_by_label("2 experts").click_accesskit();
+        settle(&mut page);
+        page.state_mut().as_mut().unwrap().pin();
+        for tab in ["Learn", "Train", "World", "Race", "β sweep", "Attack bench", "Table 1"] {
+            go_to(&mut page, tab);
+            page.run_steps(4);
+            check(&page, tab);
+        }
+        // The lesson's longest steps, and looking back.
+        go_to(&mut page, "Learn");
+        for step in ["Step 3: β rises, and they part", "Step 7: It must be so"] {
+            page.get_by_label(step).click_accesskit();
+            settle(&mut page);
+            check(&page, step);
+        }
+        page.state_mut().as_mut().unwrap().seek(100);
+        page.run_steps(4);
+        check(&page, "looking back");
     }
 }
 

@@ -400,12 +400,17 @@ impl App {
         self.view.sought.or(self.shown.as_ref().map(|shown| shown.snapshot.update)).unwrap_or(0)
     }
 
+    fn send_setup(&mut self) {
+        self.send(Command::Load { setup: Box::new(self.setup.clone()), play: true });
+    }
+
+    /// Trains what the controls say; what was said of the run before is gone.
     fn load(&mut self) {
         self.notice = None;
         self.promise = None;
         self.reproduced = None;
         self.view.sought = None;
-        self.send(Command::Load { setup: Box::new(self.setup.clone()), play: true });
+        self.send_setup();
     }
 
     /// The clone that is trained against, and the honest one or the blind one beside it.
@@ -436,7 +441,7 @@ impl App {
                     self.making.drain(..).for_each(|(id, ..)| self.pool.cancel(id));
                     self.send(Command::Speed(toolbar::SPEEDS[self.view.speed]));
                     self.send(Command::Show(self.view.clones.clone()));
-                    self.load();
+                    self.send_setup();
                 }
                 Ok(Event::Ready { .. }) => {
                     let sentence = "The worker is of another version than the page: reload the page.";

@@ -61,7 +61,7 @@ impl Shown {
         });
         ui.add_space(GAP);
         theme::card(ui).show(ui, |ui| {
-            ui.set_height(260.0);
+            ui.set_height(240.0 + timeline::height(ui, self));
             self.show_chart(ui, view, kept, &mut touched);
         });
         touched

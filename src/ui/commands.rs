@@ -353,6 +353,8 @@ pub fn listen(ctx: &Context, app: &mut App) {
                 });
             if is_pressed && (command.can)(app) {
                 (command.run)(app, ctx);
+                // What it changed is drawn in the next frame.
+                ctx.request_repaint();
                 return;
             }
         }
@@ -360,6 +362,7 @@ pub fn listen(ctx: &Context, app: &mut App) {
     for (key, (tab, ..)) in TAB_KEYS.into_iter().zip(TABS) {
         if !is_blocked && ctx.input(|input| input.modifiers.is_none() && input.key_pressed(key)) {
             app.view.tab = tab;
+            ctx.request_repaint();
         }
     }
 }
@@ -492,6 +495,7 @@ pub fn show_palette(ctx: &Context, app: &mut App) {
         app.palette.query = Some(query);
         return;
     };
+    ctx.request_repaint();
     match deed {
         Deed::Command(command) if (command.can)(app) => (command.run)(app, ctx),
         Deed::Command(_) => {}

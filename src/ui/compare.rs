@@ -1,13 +1,13 @@
 //! Runs that stay on the page: their figures stand under those of the run shown, their curves behind its curve.
 
-use egui::{Color32, Grid, RichText, ScrollArea, Ui};
+use egui::{Color32, Grid, RichText, Ui};
 
 use super::app::App;
 use super::board::Shown;
 use super::numbers;
 use super::theme::{self, Palette};
 use super::widgets::{Icon, icon_button};
-use crate::mdp::{KnownReturns, RETURN_KINDS};
+use crate::mdp::RETURN_KINDS;
 
 /// A run that is kept as it was last seen.
 pub struct Kept {
@@ -69,48 +69,82 @@ pub fn show(ui: &mut Ui, app: &mut App) {
     if app.kept.is_empty() {
         return;
     }
-    let palette = Palette::of(ui);
-    let kind = &RETURN_KINDS[app.view.kind];
     let (mut dropped, mut brought) = (None, None);
-    let small = |ui: &mut Ui, text: String, color: Color32| {
+    let is_narrow = ui.available_width() < theme::NARROW;
+    ui.add_space(4.0);
+    let lines: Vec<Line> = app.kept.iter().map(|kept| Line::of(kept, app.view.kind)).collect();
+    let palette = Palette::of(ui);
+    let small = |ui: &mut Ui, text: &str, color: Color32| {
         ui.add(egui::Label::new(RichText::new(text).small().color(color)).extend());
     };
-    ui.add_space(4.0);
-    ScrollArea::horizontal().id_salt("kept").show(ui, |ui| {
-        Grid::new("kept").spacing([14.0, 2.0]).min_col_width(0.0).show(ui, |ui| {
-            for head in ["Kept to compare", "ensemble", "clone", "clone ÷ ensemble", "update", "digest", "", ""] {
-                small(ui, head.to_owned(), palette.muted);
+    let mut buttons = |ui: &mut Ui, index: usize, name: &str| {
+        let response = ui.small_button("Show again").on_hover_text("Trains it again, to the same digest");
+        if response.accessible_name(format!("Show again: {name}")).clicked() {
+            brought = Some(index);
+        }
+        if icon_button(ui, Icon::Remove, &format!("Drop: {name}"), false).clicked() {
+            dropped = Some(index);
+        }
+    };
+    if is_narrow {
+        small(ui, "Kept to compare", palette.muted);
+        for (index, line) in lines.iter().enumerate() {
+            let [ensemble, clone, ratio, update, _] = &line.figures;
+            ui.add(
+                egui::Label::new(RichText::new(format!("— {}", line.name)).small().color(palette.kept(index))).wrap(),
+            );
+            small(ui, &format!("ensemble {ensemble}, clone {clone}, {ratio}, update {update}"), palette.ink);
+            ui.horizontal(|ui| buttons(ui, index, &line.name));
+        }
+    } else {
+        Grid::new("kept").spacing([14.0, 0.0]).min_col_width(0.0).show(ui, |ui| {
+            for head in ["Kept to compare", "ensemble", "clone", "clone ÷ ensemble", "update", "digest", ""] {
+                small(ui, head, palette.muted);
             }
             ui.end_row();
-            for (index, kept) in app.kept.iter().enumerate() {
-                let snapshot = &kept.shown.snapshot;
-                let clone: Option<&KnownReturns> = snapshot.clones.first().map(|clone| &clone.view.returns);
-                let clone = clone.and_then(|clone| clone.get(app.view.kind));
-                let ensemble = (kind.get)(&snapshot.ensemble);
-                let of_clone = clone.map_or("–".to_owned(), |clone| numbers::of_kind(kind, clone));
-                let ratio = clone.filter(|_| kind.is_steps).map(|clone| numbers::decimal(clone / ensemble, 1) + "×");
-                small(ui, format!("— {}", kept.name), palette.kept(index));
-                small(ui, numbers::of_kind(kind, ensemble), palette.ink);
-                small(ui, of_clone, palette.ink);
-                small(ui, ratio.unwrap_or("–".to_owned()), palette.ink);
-                small(ui, snapshot.update.to_string(), palette.ink);
-                small(ui, numbers::digest(snapshot.digest), palette.muted);
-                let response = ui.small_button("Show again").on_hover_text("Trains it again, to the same digest");
-                if response.accessible_name(format!("Show again: {}", kept.name)).clicked() {
-                    brought = Some(index);
+            for (index, line) in lines.iter().enumerate() {
+                ui.spacing_mut().interact_size.y = 22.0;
+                small(ui, &format!("— {}", line.name), palette.kept(index));
+                for (column, figure) in line.figures.iter().enumerate() {
+                    small(ui, figure, if column == 4 { palette.muted } else { palette.ink });
                 }
-                if icon_button(ui, Icon::Remove, &format!("Drop: {}", kept.name), false).clicked() {
-                    dropped = Some(index);
-                }
+                ui.horizontal(|ui| buttons(ui, index, &line.name));
                 ui.end_row();
             }
         });
-    });
+    }
     if let Some(index) = brought {
         app.bring_back(index);
     }
     if let Some(index) = dropped {
         app.kept.remove(index);
     }
-    ui.add_space(theme::GAP / 2.0);
+}
+
+/// A kept run in words.
+struct Line {
+    name: String,
+    /// Ensemble, clone, their ratio, update, digest.
+    figures: [String; 5],
+}
+
+impl Line {
+    fn of(kept: &Kept, at: usize) -> Line {
+        let kind = &RETURN_KINDS[at];
+        let snapshot = &kept.shown.snapshot;
+        let clone = snapshot.clones.first().and_then(|clone| clone.view.returns.get(at));
+        let ensemble = (kind.get)(&snapshot.ensemble);
+        let ratio = clone.filter(|_| kind.is_steps).map(|clone| numbers::decimal(clone / ensemble, 1) + "×");
+        let dash = || "–".to_owned();
+        Line {
+            name: kept.name.clone(),
+            figures: [
+                numbers::of_kind(kind, ensemble),
+                clone.map_or_else(dash, |clone| numbers::of_kind(kind, clone)),
+                ratio.unwrap_or_else(dash),
+                snapshot.update.to_string(),
+                numbers::digest(snapshot.digest),
+            ],
+        }
+    }
 }

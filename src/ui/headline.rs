@@ -35,6 +35,8 @@ impl Headline {
 
 /// Width of the β slider where the figures stand beside it.
 const BETA_WIDTH: f32 = 330.0;
+/// Width that all figures need in one row.
+const FIGURES: f32 = 560.0;
 
 /// The β slider with its mode; then the figures, beside it where there is room.
 pub fn show(ui: &mut Ui, app: &mut App) {
@@ -47,7 +49,8 @@ pub fn show(ui: &mut Ui, app: &mut App) {
         ui.horizontal_top(|ui| {
             ui.spacing_mut().item_spacing.x = 2.0 * SPACE;
             ui.vertical(|ui| beta(ui, app, BETA_WIDTH));
-            ui.vertical(|ui| figures(ui, app, 4));
+            let columns = if width < BETA_WIDTH + FIGURES { 2 } else { 4 };
+            ui.vertical(|ui| figures(ui, app, columns));
         });
     }
 }

@@ -10,11 +10,15 @@ use super::widgets::{Icon, icon_button};
 use crate::ape::{Config, Field};
 use crate::lab::RunState;
 
+/// Width from which the controls of a branch stand in one line.
+const ONE_LINE: f32 = 400.0;
+
 /// Height of the timeline; looking back it needs another line.
 pub fn height(ui: &Ui, shown: &Shown) -> f32 {
     let line = ui.spacing().interact_size.y + ui.spacing().item_spacing.y;
     match shown.snapshot.state {
         RunState::Given => 0.0,
+        _ if is_back(shown) && ui.available_width() < ONE_LINE => 3.0 * line,
         _ if is_back(shown) => 2.0 * line,
         _ => line,
     }
@@ -60,16 +64,15 @@ pub fn show(ui: &mut Ui, shown: &Shown, view: &View, touched: &mut Touched) {
 
 /// Going on from a moment that lies back.
 fn branch(ui: &mut Ui, shown: &Shown, touched: &mut Touched) {
-    ui.horizontal(|ui| {
+    let is_narrow = ui.available_width() < ONE_LINE;
+    ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing.x = 6.0;
-        let is_wide = ui.available_width() > 330.0;
         let id = egui::Id::unique("branch β");
         let run = shown.snapshot.run;
         // What was set for this run, or the β that it has.
         let drafted = ui.data(|data| data.get_temp::<(u32, f64)>(id)).filter(|(of, _)| *of == run);
         let mut beta = drafted.map_or(shown.snapshot.beta, |(_, beta)| beta);
-        let text = if is_wide { "from here with β" } else { "with β" };
-        ui.label(RichText::new(text).small().color(Palette::of(ui).muted));
+        ui.label(RichText::new("from here with β").small().color(Palette::of(ui).muted));
         let drag = DragValue::new(&mut beta)
             .range(0.0..=Config::MAX_BETA)
             .speed(0.01)
@@ -78,6 +81,9 @@ fn branch(ui: &mut Ui, shown: &Shown, touched: &mut Touched) {
         let response = ui.add(drag).accessible_name("β of the branch").on_hover_text(Field::named("beta").tip());
         if response.changed() {
             ui.data_mut(|data| data.insert_temp(id, (run, beta)));
+        }
+        if is_narrow {
+            ui.end_row();
         }
         let help =
             "Trains on from this moment with this β, as a branch of its own; the run it leaves is kept to compare with";

@@ -9,6 +9,7 @@ use super::app::App;
 use super::heatmap;
 use super::panels::{self, Plan};
 use super::theme::{self, GAP, NARROW, Palette};
+use super::widgets::heading;
 use crate::experiment::WORLDS;
 use crate::mdp::{Cell, Grid, GridSpec};
 
@@ -41,6 +42,7 @@ const MOST_UNDONE: usize = 100;
 
 impl WorldTab {
     pub fn show(&mut self, ui: &mut Ui, app: &mut App) {
+        heading(ui, 2, RichText::new("World").heading());
         let text = "Draw walls and take them away, drag the flag: the experts are trained anew in what you drew.";
         ui.label(RichText::new(text).color(Palette::of(ui).muted));
         self.show_controls(ui, app);

@@ -4,9 +4,9 @@ import assert from "node:assert/strict";
 import { fileURLToPath } from "node:url";
 import { after, before, test } from "node:test";
 import { launch, open, serve } from "./browser.mjs";
+import { PATIENCE, press, trained, until, widget } from "./visitor.mjs";
 
 const AXE = fileURLToPath(new URL("./node_modules/axe-core/axe.min.js", import.meta.url));
-const PATIENCE = { timeout: 60_000 };
 
 let browser, site;
 before(async () => {
@@ -18,28 +18,8 @@ after(async () => {
   site?.close();
 });
 
-const trained = (page) => page.getByRole("status").filter({ hasText: /^trained/ }).waitFor(PATIENCE);
-const widget = (page, role, name) => page.getByRole(role, { name, exact: true });
-
 /** What a screen reader does to activate an element. */
 const activate = (locator) => locator.evaluate((element) => element.click());
-
-/** Polls until a promise satisfies a condition. */
-async function until(promise, condition) {
-  let value;
-  for (let tries = 0; tries < 200; tries++) {
-    value = await promise();
-    if (condition(value)) return value;
-    await new Promise((resolve) => setTimeout(resolve, 50));
-  }
-  assert.fail(`waited for 10 seconds: ${JSON.stringify(value)}`);
-}
-
-/** Presses a key, and gives the page time to draw. */
-async function press(page, key) {
-  await page.keyboard.press(key);
-  await page.waitForTimeout(80);
-}
 
 /** The id that the canvas says has the focus, or that of the element which has it. */
 const focused = (page) =>
@@ -76,9 +56,31 @@ test("axe finds nothing to object to", async () => {
   await activate(widget(page, "button", "Advanced"));
   await until(() => widget(page, "button", "Advanced").getAttribute("aria-expanded"), (is) => is === "true");
   await check("advanced settings");
-  for (const tab of ["β sweep", "Table 1", "Attack bench"]) {
+  for (const [name, button, sign] of [
+    ["find a command", "Find a command", widget(page, "dialog", "Find a command")],
+    ["settings", "Settings", widget(page, "radio", "Text size: 130 %")],
+    ["export", "Export and open", widget(page, "button", "Curve as CSV")],
+  ]) {
+    await activate(widget(page, "button", button));
+    await sign.waitFor(PATIENCE);
+    await check(name);
+    await press(page, "Escape");
+    await sign.waitFor({ state: "detached", ...PATIENCE });
+  }
+  await page.keyboard.press("t");
+  await widget(page, "dialog", "Policies as a table").getByRole("rowheader").first().waitFor(PATIENCE);
+  await check("policies as a table");
+  await press(page, "Escape");
+  for (const [tab, title] of [
+    ["Learn", "One expert has no secrets"],
+    ["World", "World"],
+    ["Race", "Race"],
+    ["β sweep", /β/],
+    ["Table 1", /Table 1/],
+    ["Attack bench", /Attack bench/],
+  ]) {
     await activate(widget(page, "radio", `Tab: ${tab}`));
-    await page.getByRole("heading", { level: 2, name: new RegExp(tab === "β sweep" ? "β" : tab) }).first().waitFor(PATIENCE);
+    await page.getByRole("heading", { level: 2, name: title }).first().waitFor(PATIENCE);
     await check(tab);
   }
   // The bench again, with its table.

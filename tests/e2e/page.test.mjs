@@ -1,16 +1,11 @@
 // The built page in headless Chromium, as a visitor meets it. Widgets are found in the mirror of the page.
 import assert from "node:assert/strict";
-import { mkdir } from "node:fs/promises";
-import { fileURLToPath } from "node:url";
 import { after, before, test } from "node:test";
 import { launch, open, serve } from "./browser.mjs";
-
-const SHOTS = fileURLToPath(new URL("./screenshots/", import.meta.url));
-const PATIENCE = { timeout: 60_000 };
+import { PATIENCE, SHOTS, click, downloaded, figure, status, trained, until } from "./visitor.mjs";
 
 let browser, site;
 before(async () => {
-  await mkdir(SHOTS, { recursive: true });
   site = await serve();
   browser = await launch();
 });
@@ -18,31 +13,6 @@ after(async () => {
   await browser?.close();
   site?.close();
 });
-
-const status = (page) => page.getByRole("status").first();
-const trained = (page) => page.getByRole("status").filter({ hasText: /^trained/ }).waitFor(PATIENCE);
-
-/** The number in the figure whose spoken text starts so. */
-async function figure(page, start) {
-  const text = await page.locator("#mirror").getByText(new RegExp("^" + start + "[^:]*: ")).textContent();
-  return Number(text.split(": ")[1].replace("−", "-").replace(/ steps|×/, ""));
-}
-
-/** Clicks where a mirrored widget lies: the canvas below gets the pointer. */
-async function click(page, role, name) {
-  const box = await page.getByRole(role, { name, exact: true }).boundingBox();
-  await page.mouse.click(box.x + box.width / 2, box.y + box.height / 2);
-}
-
-/** Polls until a promise of a number satisfies a condition. */
-async function until(number, condition) {
-  for (let tries = 0; tries < 300; tries++) {
-    const value = await number();
-    if (condition(value)) return value;
-    await new Promise((resolve) => setTimeout(resolve, 100));
-  }
-  assert.fail("waited for 30 seconds");
-}
 
 test("the page trains by itself, and β moved with the keyboard changes what it shows", async () => {
   const { page, problems, close } = await open(browser, site.address);
@@ -112,14 +82,7 @@ async function only(page, cloners) {
 }
 
 /** What a click makes the page download. */
-async function download(page, button) {
-  const coming = page.waitForEvent("download", PATIENCE);
-  await click(page, "button", button);
-  const file = await coming;
-  const chunks = [];
-  for await (const chunk of await file.createReadStream()) chunks.push(chunk);
-  return { name: file.suggestedFilename(), text: Buffer.concat(chunks).toString() };
-}
+const download = (page, button) => downloaded(page, () => click(page, "button", button));
 
 test("every cloner attacks the ensemble shown, in workers of its own", async () => {
   const { page, problems, close } = await open(browser, site.address);

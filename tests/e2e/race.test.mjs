@@ -1,16 +1,11 @@
 // The race in headless Chromium: a click chooses the start, the racers run, a thousand agree with what is exact.
 import assert from "node:assert/strict";
-import { mkdir } from "node:fs/promises";
-import { fileURLToPath } from "node:url";
 import { after, before, test } from "node:test";
 import { launch, open, serve } from "./browser.mjs";
-
-const SHOTS = fileURLToPath(new URL("./screenshots/", import.meta.url));
-const PATIENCE = { timeout: 60_000 };
+import { PATIENCE, SHOTS, click, trained } from "./visitor.mjs";
 
 let browser, site;
 before(async () => {
-  await mkdir(SHOTS, { recursive: true });
   site = await serve();
   browser = await launch();
 });
@@ -18,14 +13,6 @@ after(async () => {
   await browser?.close();
   site?.close();
 });
-
-const trained = (page) => page.getByRole("status").filter({ hasText: /^trained/ }).waitFor(PATIENCE);
-
-/** Clicks where a mirrored widget lies: the canvas below gets the pointer. */
-async function click(page, role, name, at = [0.5, 0.5]) {
-  const box = await page.getByRole(role, { name, exact: typeof name === "string" }).boundingBox();
-  await page.mouse.click(box.x + box.width * at[0], box.y + box.height * at[1]);
-}
 
 test("a race runs from the cell that was clicked, and a thousand agree with the exact figures", async () => {
   const { page, problems, close } = await open(browser, site.address);
