@@ -261,6 +261,8 @@ test("a broken or old link gets a sentence and the default", async () => {
 
 test("what is exported comes back with the same figures, and survives a reload", async () => {
   const { page, problems, close } = await open(browser, site.address);
+  // From now on: choosers are waited for only while somebody listens.
+  page.on("filechooser", () => {});
   await trained(page);
   const figures = async () => [await figure(page, "Ensemble"), await figure(page, "Clone \\(uniform\\)")];
   const before = await figures();
@@ -351,7 +353,7 @@ test("by keyboard alone: tabs, training, moments, pins, help", async () => {
   await until(() => page.getByRole("dialog").count(), (count) => count === 0);
   await press(page, "t");
   const table = page.getByRole("dialog", { name: "Policies as a table" });
-  await table.getByRole("row").nth(5).waitFor(PATIENCE);
+  await table.getByRole("rowheader").nth(5).waitFor(PATIENCE);
   await press(page, "Escape");
   await press(page, "c");
   await until(() => page.evaluate(() => localStorage.getItem("ape-lab.preferences")), (text) => /"color_map":1/.test(text));
