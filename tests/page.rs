@@ -2,7 +2,7 @@
 //! The page as egui draws it, without a window: what it says, what its controls do, that nothing is cut off.
 
 use std::cell::RefCell;
-use std::collections::VecDeque;
+use std::collections::{HashMap, VecDeque};
 use std::rc::Rc;
 
 use ape_lab::ape::EnsembleFile;
@@ -94,6 +94,10 @@ struct Desktop {
     saved: Rc<RefCell<Vec<(String, String)>>>,
     to_open: Rc<RefCell<Vec<NamedText>>>,
     failures: Rc<RefCell<Vec<String>>>,
+    /// What the visitor puts behind `#`, and what the page has put there.
+    visits: Rc<RefCell<Vec<String>>>,
+    address: Rc<RefCell<String>>,
+    kept: Rc<RefCell<HashMap<String, String>>>,
 }
 
 impl Host for Desktop {
@@ -119,6 +123,23 @@ impl Host for Desktop {
     fn opened(&mut self) -> Option<NamedText> {
         self.to_open.borrow_mut().pop()
     }
+
+    fn visited(&mut self) -> Option<String> {
+        self.visits.borrow_mut().pop()
+    }
+
+    fn set_address(&mut self, fragment: &str) {
+        *self.address.borrow_mut() = fragment.to_owned();
+    }
+
+    fn keep(&mut self, name: &str, text: &str) -> Result<(), String> {
+        self.kept.borrow_mut().insert(name.to_owned(), text.to_owned());
+        Ok(())
+    }
+
+    fn kept(&self, name: &str) -> Option<String> {
+        self.kept.borrow().get(name).cloned()
+    }
 }
 
 type Page<'a> = Harness<'a, Option<App>>;
@@ -130,6 +151,8 @@ fn open<'a>(width: f32, height: f32) -> (Page<'a>, Here) {
 fn open_with<'a>(width: f32, height: f32, desktop: Desktop) -> (Page<'a>, Here) {
     let here = Here::new();
     let link = here.clone();
+    // What an address asks for may rest anywhere.
+    let is_visit = !desktop.visits.borrow().is_empty();
     let mut page = Harness::builder().with_size(egui::vec2(width, height)).build_ui_state(
         move |ui, app: &mut Option<App>| {
             match app {
@@ -146,7 +169,9 @@ fn open_with<'a>(width: f32, height: f32, desktop: Desktop) -> (Page<'a>, Here) 
         },
         None,
     );
-    settle(&mut page);
+    if !is_visit {
+        settle(&mut page);
+    }
     (page, here)
 }
 
@@ -664,4 +689,182 @@ fn the_race_fits_a_phone() {
         let board = page.get_by_label_contains("Race board").accesskit_node().bounding_box().unwrap();
         assert!(board.x1 - board.x0 > if width < 720.0 { 330.0 } else { 0.3 * f64::from(width) }, "{width}: {board:?}");
     }
+}
+
+/// Draws until the status begins so.
+fn until(page: &mut Page, start: &str) {
+    for _ in 0..400 {
+        page.step();
+        if page
+            .query_by(|node| node.role() == Role::Status && says(node).is_some_and(|text| text.starts_with(start)))
+            .is_some()
+        {
+            return;
+        }
+    }
+    panic!("no status begins with {start}");
+}
+
+#[test]
+fn the_past_can_be_shown_and_left_by_another_way() {
+    let (mut page, here) = open(1280.0, 800.0);
+    let end = figure(&page, "Ensemble capped");
+    page.key_press(egui::Key::Home);
+    until(&mut page, "paused at update 0 of 732");
+    assert!(figure(&page, "Ensemble capped") < -90.0);
+    page.get_by_role_and_label(Role::Slider, "Timeline").set_value_accesskit(300.0);
+    until(&mut page, "paused at update 300 of 732");
+    page.key_press(egui::Key::ArrowRight);
+    until(&mut page, "paused at update 301 of 732");
+    press(&mut page, "One update back");
+    until(&mut page, "paused at update 300 of 732");
+    let there = figure(&page, "Ensemble capped");
+    page.get_by_role_and_label(Role::SpinButton, "β of the branch").set_value_accesskit(0.05);
+    page.run_steps(3);
+    press(&mut page, "Continue from here");
+    settle(&mut page);
+    page.run_steps(8);
+    assert!(here.0.borrow().commands.contains(&Command::Continue { beta: 0.05 }));
+    // The branch is another run; the one it left is kept, as it was when it was left.
+    assert!(figure(&page, "Ensemble capped") > end);
+    page.get_by(|node| says(node).is_some_and(|text| text == numbers_of(there)));
+    page.get_by_label("— β 0.6 · uniform · n 2 · seed 1");
+    press(&mut page, "Show again: β 0.6 · uniform · n 2 · seed 1");
+    until(&mut page, "paused at update 300 of 732");
+    assert_eq!(figure(&page, "Ensemble capped"), there);
+    press(&mut page, "Drop: β 0.6 · uniform · n 2 · seed 1");
+    assert!(page.query_by_label("— β 0.6 · uniform · n 2 · seed 1").is_none());
+}
+
+/// As the page writes a return.
+fn numbers_of(value: f64) -> String {
+    format!("{value:.1}").replace('-', "−")
+}
+
+#[test]
+fn an_address_brings_everything_back() {
+    let first = Desktop::default();
+    let fragment = "v=1&size=6x7&goal=2,3&walls=0:0-1;4:5&beta=0.4&seed=9&turns=100:0.2&tab=world&return=success&clones=occupancy&cell=1,2&at=321";
+    first.visits.borrow_mut().push(fragment.to_owned());
+    let (mut page, _) = open_with(1280.0, 800.0, first.clone());
+    until(&mut page, "paused at update 321 of 732");
+    page.get_by_label("Optimal success return: 100 %");
+    page.run_steps(40);
+    let written = first.address.borrow().clone();
+    let (same, digest) = written.split_once("&digest=").unwrap();
+    assert_eq!(same, fragment);
+    // The same again, with its digest.
+    let second = Desktop::default();
+    second.visits.borrow_mut().push(written.clone());
+    let (mut page, _) = open_with(1280.0, 800.0, second.clone());
+    until(&mut page, &format!("paused at update 321 of 732, digest {digest}, the same as in the link"));
+    page.run_steps(40);
+    assert_eq!(*second.address.borrow(), written);
+    // A branch whose run was longer than planned, and a preset with an ensemble.
+    for fragment in ["v=1&turns=700:0.3&updates=900&digest=0000000000000000", "v=1&ensemble=trap&observer=occupancy"] {
+        second.visits.borrow_mut().push(fragment.to_owned());
+        page.run_steps(2);
+        until(&mut page, if fragment.contains("trap") { "given" } else { "trained, update 900 of 900" });
+        if !fragment.contains("trap") {
+            page.get_by(|node| {
+                says(node).is_some_and(|text| text.ends_with("but the link was made with 0000000000000000"))
+            });
+        }
+        page.run_steps(40);
+        assert_eq!(second.address.borrow().split("&digest").next(), fragment.split("&digest").next());
+    }
+    assert_eq!(page.state().as_ref().unwrap().preset(), Some(6));
+}
+
+/// Every step sets its stage, and every sentence of it has figures of the ensemble that is there.
+#[test]
+fn the_lesson_is_true_of_what_is_shown() {
+    let (mut page, _) = open(1280.0, 800.0);
+    go_to(&mut page, "Learn");
+    settle(&mut page);
+    let mut sentences = Vec::new();
+    loop {
+        page.run_steps(10);
+        let app = page.state().as_ref().unwrap();
+        let (_, snapshot) = app.shown().unwrap();
+        let of =
+            |name: &str| snapshot.clones.iter().find(|clone| clone.cloner.to_string() == name).unwrap().view.returns;
+        let ensemble = snapshot.ensemble;
+        match sentences.len() {
+            0 => assert!(snapshot.experts.len() == 1 && of("uniform").capped_return == Some(ensemble.capped_return)),
+            1 => assert!(of("uniform").capped_return.unwrap() > ensemble.capped_return - 0.5),
+            2..=4 => assert!(of("uniform").capped_return < Some(-90.0) && ensemble.capped_return > -20.0),
+            5 => assert!((of("occupancy").capped_return.unwrap() - ensemble.capped_return).abs() < 0.1),
+            6 | 9 => assert!((of("occupancy").horizon_return - ensemble.horizon_return).abs() < 0.1),
+            7 => assert!(of("occupancy").capped_return < Some(-90.0) && of("occupancy").horizon_return > -11.0),
+            8 => assert_eq!(of("history").horizon_return, ensemble.horizon_return),
+            step => panic!("there is no step {step}"),
+        }
+        let live = page.query_all_by(|node| {
+            says(node).is_some_and(|text| {
+                ["The expert returns", "The ensemble returns", "Row 5", "Within T the", "Left: the", "The clone ("]
+                    .iter()
+                    .any(|start| text.starts_with(start))
+            })
+        });
+        sentences.push(live.last().and_then(|node| says(&node.accesskit_node())));
+        let next = page.get_by_role_and_label(Role::Button, "Next");
+        if next.accesskit_node().is_disabled() {
+            break;
+        }
+        next.click_accesskit();
+        page.run_steps(3);
+        settle(&mut page);
+    }
+    assert_eq!(sentences.len(), 10);
+    // The last has none.
+    assert_eq!(sentences.iter().flatten().count(), 9, "{sentences:#?}");
+}
+
+#[test]
+fn a_world_is_drawn_and_trained_in() {
+    let (mut page, here) = open(1280.0, 800.0);
+    go_to(&mut page, "World");
+    page.run_steps(3);
+    let bounds = |page: &Page| {
+        let board = page.get_by(|node| says(node).is_some_and(|text| text.starts_with("World: row")));
+        board.rect()
+    };
+    let rect = bounds(&page);
+    let at = |row: f32, col: f32| rect.min + rect.size() * egui::vec2((col + 0.5) / 10.0, (row + 0.5) / 10.0);
+    let stroke = |page: &mut Page, from: (f32, f32), to: (f32, f32)| {
+        page.drag_at(at(from.0, from.1));
+        page.step();
+        page.hover_at(at(to.0, to.1));
+        page.step();
+        page.drop_at(at(to.0, to.1));
+        page.run_steps(3);
+    };
+    stroke(&mut page, (4.0, 0.0), (4.0, 8.0));
+    let walls = |here: &Here| {
+        let desk = here.0.borrow();
+        desk.commands.iter().rev().find_map(|command| match command {
+            Command::Load { setup, .. } => Some(setup.grid.walls.len()),
+            _ => None,
+        })
+    };
+    assert_eq!(walls(&here), Some(9));
+    let loads = here.0.borrow().commands.len();
+    // The last gap stays open, with a sentence.
+    stroke(&mut page, (4.0, 9.0), (4.0, 9.0));
+    page.get_by(|node| {
+        node.role() == Role::Alert
+            && says(node).is_some_and(|text| text.starts_with("No wall in row 4, column 9: cell"))
+    });
+    assert!(!here.0.borrow().commands[loads..].iter().any(|command| matches!(command, Command::Load { .. })));
+    stroke(&mut page, (4.0, 3.0), (4.0, 5.0));
+    assert_eq!(walls(&here), Some(6));
+    press(&mut page, "Undo");
+    press(&mut page, "Undo");
+    assert_eq!(walls(&here), Some(0));
+    page.get_by_role_and_label(Role::SpinButton, "Rows").set_value_accesskit(4.0);
+    page.run_steps(4);
+    settle(&mut page);
+    let app = page.state().as_ref().unwrap();
+    assert_eq!((app.setup().grid.rows, app.setup().grid.cols), (4, 10));
 }
