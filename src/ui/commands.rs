@@ -502,9 +502,10 @@ pub fn show_palette(ctx: &Context, app: &mut App) {
         Deed::Tab(tab) => app.view.tab = tab,
         Deed::Preset(index) => app.load_preset(index),
         Deed::World(index) => {
-            if let Err(sentence) = app.change_world(WORLDS[index].grid()) {
-                app.notice = Some(sentence);
-            }
+            let mut tab = std::mem::take(&mut app.world);
+            tab.change(app, WORLDS[index].grid());
+            app.world = tab;
+            app.view.tab = Tab::World;
         }
     }
 }

@@ -52,14 +52,16 @@ impl App {
         if width < WIDE {
             CentralPanel::no_frame().frame(sheet).show(ui, |ui| {
                 ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
-                    self.show_top(ui);
+                    self.show_bar(ui);
                     self.show_tabs(ui);
                     if self.view.tab == Tab::Learn {
                         theme::card(ui).show(ui, |ui| {
                             ui.set_width(ui.available_width());
                             lesson::show(ui, self);
                         });
+                        ui.add_space(GAP);
                     }
+                    self.show_headline(ui);
                     self.show_tab(ui, Shown::show_stacked);
                     ui.add_space(GAP);
                     theme::card(ui).show(ui, |ui| {
@@ -69,7 +71,10 @@ impl App {
                 });
             });
         } else {
-            egui::Panel::top("top").frame(sheet).show_separator_line(false).show(ui, |ui| self.show_top(ui));
+            egui::Panel::top("top").frame(sheet).show_separator_line(false).show(ui, |ui| {
+                self.show_bar(ui);
+                self.show_headline(ui);
+            });
             let is_lesson = self.view.tab == Tab::Learn;
             egui::Panel::left(if is_lesson { "lesson" } else { "controls" })
                 .exact_size(if is_lesson { LESSON } else { CONTROLS })
@@ -105,10 +110,13 @@ impl App {
         self.update_address(ui.ctx());
     }
 
-    fn show_top(&mut self, ui: &mut Ui) {
+    fn show_bar(&mut self, ui: &mut Ui) {
         ui.scope(|ui| toolbar::show(ui, self));
         ui.add_space(2.0);
         self.show_messages(ui);
+    }
+
+    fn show_headline(&mut self, ui: &mut Ui) {
         headline::show_sentence(ui, self);
         ui.add_space(4.0);
         theme::card(ui).show(ui, |ui| {

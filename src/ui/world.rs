@@ -133,7 +133,7 @@ impl WorldTab {
     }
 
     /// Trains in another world, or says why not.
-    fn change(&mut self, app: &mut App, grid: GridSpec) {
+    pub fn change(&mut self, app: &mut App, grid: GridSpec) {
         let before = app.setup().grid.clone();
         if grid == before && app.setup().ensemble.is_none() {
             return;

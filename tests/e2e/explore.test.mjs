@@ -316,6 +316,7 @@ test("the palette finds commands, presets, worlds and tabs", async () => {
   await run("world maze");
   await trained(page);
   assert.ok((await figure(page, "Optimal")) < -20);
+  await page.getByRole("heading", { name: "World", exact: true }).waitFor(PATIENCE);
   await run("go race");
   await page.getByRole("heading", { name: "Race", exact: true }).waitFor(PATIENCE);
   await press(page, "Control+k");

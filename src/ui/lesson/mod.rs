@@ -61,6 +61,13 @@ pub fn show(ui: &mut Ui, app: &mut App) {
     if app.view.staged != Some(app.view.step) && app.preset().is_some() {
         set_stage(app);
     }
+    // A new step is read from its beginning.
+    let id = egui::Id::unique("lesson step");
+    let read = ui.data(|data| data.get_temp::<usize>(id));
+    if read.is_some_and(|read| read != app.view.step) {
+        ui.scroll_to_cursor(Some(egui::Align::TOP));
+    }
+    ui.data_mut(|data| data.insert_temp(id, app.view.step));
     let mut go_to = None;
     let step = app.view.step.min(STEPS.len() - 1);
     ui.spacing_mut().item_spacing.y = 8.0;
