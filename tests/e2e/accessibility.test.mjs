@@ -68,7 +68,7 @@ test("axe finds nothing to object to", async () => {
     await sign.waitFor({ state: "detached", ...PATIENCE });
   }
   await page.keyboard.press("t");
-  await widget(page, "dialog", "Policies as a table").getByRole("rowheader").first().waitFor(PATIENCE);
+  await widget(page, "dialog", "Policies as a table").getByRole("rowheader").first().waitFor({ state: "attached", ...PATIENCE });
   await check("policies as a table");
   await press(page, "Escape");
   for (const [tab, title] of [
@@ -97,8 +97,9 @@ test("Tab goes through every widget, leaves at both ends and comes back", async 
   assert.ok(all.length > 30, String(all.length));
   const met = [];
   for (let tabs = 0; tabs < 120 && (await focused(page)) !== "end"; tabs++) {
-    await press(page, "Tab");
-    met.push(await focused(page));
+    const before = await focused(page);
+    await page.keyboard.press("Tab");
+    met.push(await until(() => focused(page), (now) => now !== before && now !== null));
   }
   assert.equal(met.pop(), "end");
   assert.deepEqual(new Set(met), new Set(all));

@@ -354,7 +354,7 @@ test("by keyboard alone: tabs, training, moments, pins, help", async () => {
   await until(() => page.getByRole("dialog").count(), (count) => count === 0);
   await press(page, "t");
   const table = page.getByRole("dialog", { name: "Policies as a table" });
-  await table.getByRole("rowheader").nth(5).waitFor(PATIENCE);
+  await table.getByRole("rowheader").nth(5).waitFor({ state: "attached", ...PATIENCE });
   await press(page, "Escape");
   await press(page, "c");
   await until(() => page.evaluate(() => localStorage.getItem("ape-lab.preferences")), (text) => /"color_map":1/.test(text));
