@@ -125,7 +125,9 @@ impl Host for Desktop {
     }
 
     fn visited(&mut self) -> Option<String> {
-        self.visits.borrow_mut().pop()
+        let visited = self.visits.borrow_mut().pop()?;
+        *self.address.borrow_mut() = visited.clone();
+        Some(visited)
     }
 
     fn set_address(&mut self, fragment: &str) {
@@ -151,6 +153,8 @@ fn open<'a>(width: f32, height: f32) -> (Page<'a>, Here) {
 fn open_with<'a>(width: f32, height: f32, desktop: Desktop) -> (Page<'a>, Here) {
     let here = Here::new();
     let link = here.clone();
+    // Who has been here before is not told where to begin.
+    desktop.kept.borrow_mut().insert("visited".to_owned(), "yes".to_owned());
     // What an address asks for may rest anywhere.
     let is_visit = !desktop.visits.borrow().is_empty();
     let mut page = Harness::builder().with_size(egui::vec2(width, height)).build_ui_state(
@@ -187,7 +191,9 @@ fn settle(page: &mut Page) {
             return;
         }
     }
-    panic!("training did not end");
+    let said: Vec<String> =
+        page.query_all_by(|node| node.role() == Role::Status).filter_map(|node| says(&node.accesskit_node())).collect();
+    panic!("training did not end: {said:?}");
 }
 
 fn says(node: &egui_kittest::kittest::AccessKitNode<'_>) -> Option<String> {
@@ -725,13 +731,15 @@ fn the_past_can_be_shown_and_left_by_another_way() {
     settle(&mut page);
     page.run_steps(8);
     assert!(here.0.borrow().commands.contains(&Command::Continue { beta: 0.05 }));
-    // The branch is another run; the one it left is kept, as it was when it was left.
-    assert!(figure(&page, "Ensemble capped") > end);
-    page.get_by(|node| says(node).is_some_and(|text| text == numbers_of(there)));
+    // The branch is another run; the one it left is kept, as it was in the end.
+    assert!(figure(&page, "Ensemble capped") > end && there < end);
+    page.get_by(|node| says(node).is_some_and(|text| text == numbers_of(end)));
+    assert_eq!(page.state().as_ref().unwrap().preset(), None);
     page.get_by_label("— β 0.6 · uniform · n 2 · seed 1");
     press(&mut page, "Show again: β 0.6 · uniform · n 2 · seed 1");
-    until(&mut page, "paused at update 300 of 732");
-    assert_eq!(figure(&page, "Ensemble capped"), there);
+    settle(&mut page);
+    page.run_steps(8);
+    assert_eq!(figure(&page, "Ensemble capped"), end);
     press(&mut page, "Drop: β 0.6 · uniform · n 2 · seed 1");
     assert!(page.query_by_label("— β 0.6 · uniform · n 2 · seed 1").is_none());
 }
@@ -744,6 +752,24 @@ fn numbers_of(value: f64) -> String {
 #[test]
 fn an_address_brings_everything_back() {
     let first = Desktop::default();
+    // Back to the start from a branch is a plain run again, and the address says so.
+    let (mut page, _) = open_with(1280.0, 800.0, first.clone());
+    page.key_press(egui::Key::Home);
+    until(&mut page, "paused at update 0 of 732");
+    page.state_mut().as_mut().unwrap().continue_with(0.3);
+    settle(&mut page);
+    press(&mut page, "Back to the start");
+    until(&mut page, "paused at update 0 of 732");
+    page.run_steps(40);
+    assert!(first.address.borrow().starts_with("v=1&beta=0.3&at=0&digest="), "{}", first.address.borrow());
+    // A moment that is sought while a new run begins: timeline and status agree in the end.
+    page.key_press(egui::Key::ArrowUp);
+    page.key_press(egui::Key::ArrowLeft);
+    page.run_steps(80);
+    let at = page.get_by_role_and_label(Role::Slider, "Timeline").accesskit_node().numeric_value().unwrap();
+    page.get_by(|node| {
+        node.role() == Role::Status && says(node).is_some_and(|text| text.contains(&format!("update {at} of 732")))
+    });
     let fragment = "v=1&size=6x7&goal=2,3&walls=0:0-1;4:5&beta=0.4&seed=9&turns=100:0.2&tab=world&return=success&clones=occupancy&cell=1,2&at=321";
     first.visits.borrow_mut().push(fragment.to_owned());
     let (mut page, _) = open_with(1280.0, 800.0, first.clone());
@@ -793,7 +819,14 @@ fn the_lesson_is_true_of_what_is_shown() {
         match sentences.len() {
             0 => assert!(snapshot.experts.len() == 1 && of("uniform").capped_return == Some(ensemble.capped_return)),
             1 => assert!(of("uniform").capped_return.unwrap() > ensemble.capped_return - 0.5),
-            2..=4 => assert!(of("uniform").capped_return < Some(-90.0) && ensemble.capped_return > -20.0),
+            3 => {
+                // At the marked cell both experts know where they go, and it is opposite ways.
+                let cell = app.view.cell.unwrap();
+                let [left, right] =
+                    [2, 3].map(|action| snapshot.experts.iter().map(|e| e.policy[cell][action]).fold(0.0, f32::max));
+                assert!(left > 0.8 && right > 0.8, "{left} {right}");
+            }
+            2 | 4 => assert!(of("uniform").capped_return < Some(-90.0) && ensemble.capped_return > -20.0),
             5 => assert!((of("occupancy").capped_return.unwrap() - ensemble.capped_return).abs() < 0.1),
             6 | 9 => assert!((of("occupancy").horizon_return - ensemble.horizon_return).abs() < 0.1),
             7 => assert!(of("occupancy").capped_return < Some(-90.0) && of("occupancy").horizon_return > -11.0),
@@ -802,12 +835,18 @@ fn the_lesson_is_true_of_what_is_shown() {
         }
         let live = page.query_all_by(|node| {
             says(node).is_some_and(|text| {
-                ["The expert returns", "The ensemble returns", "Row 5", "Within T the", "Left: the", "The clone ("]
+                ["The expert returns", "The ensemble returns", "Row 3", "Within T the", "Left: the", "The clone ("]
                     .iter()
                     .any(|start| text.starts_with(start))
             })
         });
         sentences.push(live.last().and_then(|node| says(&node.accesskit_node())));
+        // Who looks back and goes on sees the next step's end of the run.
+        if sentences.len() == 3 {
+            page.state_mut().as_mut().unwrap().seek(110);
+            until(&mut page, "paused at update 110");
+            page.get_by_label("Show this step again");
+        }
         let next = page.get_by_role_and_label(Role::Button, "Next");
         if next.accesskit_node().is_disabled() {
             break;

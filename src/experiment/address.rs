@@ -123,6 +123,10 @@ pub fn read(pairs: &mut Pairs) -> Result<Setup, AddressError> {
     if let Some(name) = take(pairs, "ensemble") {
         let preset = Preset::find(&name).map(|preset| (preset.setup)()).filter(|setup| setup.ensemble.is_some());
         let Some(preset) = preset else { return bad("ensemble", &name, "a preset with an ensemble, as trap") };
+        if let Some((name, value)) = pairs.iter().find(|(name, _)| ["size", "goal", "walls", "slip"].contains(&&**name))
+        {
+            return bad(name, value, "no world of its own where an ensemble is given, which has one");
+        }
         setup = Setup { config: Config::default(), ..preset };
     }
     if let Some(value) = take(pairs, "size") {
@@ -263,6 +267,8 @@ mod tests {
             ("v=1&goal=10,0", "outside the grid"),
             ("v=1&walls=0:1;1:0", "column 2) cannot reach"),
             ("v=1&walls=0:0-99999999", "expected rows with their columns"),
+            ("v=1&ensemble=trap&size=5x5", "no world of its own"),
+            ("v=1&turns=732:0.1", "in the order of their updates"),
             ("v=1&turns=5:0.1;4:0.1", "in the order of their updates"),
             ("v=1&ensemble=blind", "a preset with an ensemble"),
             ("v=1&observer=%ff", "text in UTF-8"),

@@ -44,7 +44,9 @@ pub enum SetupError {
     Json(String),
     #[error("grid: {0}")]
     Grid(#[from] GridError),
-    #[error("course: expected turns of β in the order of their updates, and 1 to 10,000,000 updates in all")]
+    #[error(
+        "course: expected turns of β in the order of their updates and before the last, and 1 to 10,000,000 updates in all"
+    )]
     Course,
     #[error("ensemble: {0}")]
     Ensemble(#[from] EnsembleError),
@@ -74,7 +76,8 @@ impl Setup {
         const MOST_UPDATES: u32 = 10_000_000;
         let Course { turns, updates } = &self.course;
         let is_ascending = turns.is_sorted_by(|(a, _), (b, _)| a < b);
-        if !is_ascending || updates.is_some_and(|updates| !(1..=MOST_UPDATES).contains(&updates)) {
+        let is_within = turns.last().is_none_or(|(last, _)| *last < self.updates());
+        if !is_ascending || !is_within || updates.is_some_and(|updates| !(1..=MOST_UPDATES).contains(&updates)) {
             return Err(SetupError::Course);
         }
         turns.iter().try_for_each(|&(_, beta)| Ok(Config { beta, ..self.config.clone() }.check()?))

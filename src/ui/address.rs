@@ -79,7 +79,11 @@ impl App {
     pub(super) fn copy_link(&mut self, ctx: &Context) {
         let link = self.host.link(&self.fragment());
         ctx.copy_text(link);
+        let turns = self.setup.course.turns.len();
         self.notice = Some(match &self.opened {
+            _ if turns > MOST_TURNS => format!(
+                "Link copied, but β was moved {turns} times during this run, which is more than a link holds: it opens the run without that."
+            ),
             Some(name) => format!(
                 "Link copied. The ensemble of {name} is too large for a link: whoever opens it needs the file as well."
             ),
@@ -96,9 +100,12 @@ impl App {
 
     /// Shows what an address says; where it is no good, says why and shows the default.
     pub(super) fn visit(&mut self, fragment: &str) {
+        // What stands there now is the visitor's; what is not so is put right.
+        self.address.0 = fragment.to_owned();
         if fragment.is_empty() {
             return;
         }
+        self.is_new = false;
         match self.read_address(fragment) {
             Ok(None) => {}
             Ok(Some(name)) => {
@@ -126,14 +133,17 @@ impl App {
     fn read_address(&mut self, fragment: &str) -> Result<Option<String>, AddressError> {
         let mut pairs = decode(fragment)?;
         let file = take(&mut pairs, "file");
+        // Where no more is said than which step, the step sets its own stage.
+        let is_staged = pairs.iter().any(|(name, _)| name != "tab" && name != "step");
         let setup = read(&mut pairs)?;
         let mut view = View { cell: None, kind: 0, step: 0, tab: super::app::Tab::Train, ..self.view.clone() };
         let mut clones = App::usual_clones(setup.config.observer);
         read_view(&mut pairs, &setup, &mut view, &mut clones)?;
-        let promise = read_promise(&mut pairs)?;
+        let promise = read_promise(&mut pairs, &setup)?;
         finish(&pairs)?;
         let preset = PRESETS.iter().position(|preset| (preset.setup)() == setup);
         self.begin(setup, preset);
+        view.staged = is_staged.then_some(view.step);
         self.view = view;
         self.show_clones(clones);
         self.promise = Some(promise).filter(|promise| *promise != Promise { update: None, digest: None });
@@ -182,12 +192,12 @@ fn read_view(
     Ok(())
 }
 
-fn read_promise(pairs: &mut Pairs) -> Result<Promise, AddressError> {
+fn read_promise(pairs: &mut Pairs, setup: &Setup) -> Result<Promise, AddressError> {
     let mut promise = Promise { update: None, digest: None };
     if let Some(value) = take(pairs, "at") {
         match value.parse() {
-            Ok(update) => promise.update = Some(update),
-            Err(_) => return bad("at", &value, "an update of the run, a whole number"),
+            Ok(update) if update <= setup.updates() => promise.update = Some(update),
+            _ => return bad("at", &value, &format!("an update of the run, 0 to {}", setup.updates())),
         }
     }
     if let Some(value) = take(pairs, "digest") {

@@ -121,6 +121,8 @@ pub struct App {
     /// Runs that stay on the page to compare with.
     pub kept: Vec<Kept>,
     pub palette: PaletteWindow,
+    /// Whether this visitor has not been here before.
+    pub is_new: bool,
     pub(super) pictures: Pictures,
     pub pool: Pool,
     pub(super) host: Box<dyn Host>,
@@ -195,6 +197,7 @@ impl App {
             preferences: Preferences::default(),
             kept: Vec::new(),
             palette: PaletteWindow::default(),
+            is_new: false,
             pictures: Pictures::default(),
             pool,
             host,
@@ -215,6 +218,7 @@ impl App {
             undrawn: None,
         };
         app.recall_preferences(ctx);
+        app.is_new = app.host.kept("visited").is_none();
         app.load_preset(0);
         app
     }
@@ -365,11 +369,23 @@ impl App {
         }
     }
 
+    /// The run from its start, paused, with the β that is set.
+    pub fn reset(&mut self) {
+        self.setup.config.beta = self.setup.last_beta();
+        if self.setup.course != Course::default() {
+            self.setup.course = Course::default();
+            self.preset = None;
+        }
+        (self.promise, self.reproduced, self.view.sought) = (None, None, None);
+        self.send(Command::Reset);
+    }
+
     /// The run goes on from the moment shown with this β; where that lies back, on a branch.
     pub fn continue_with(&mut self, beta: f64) {
         if let Some(shown) = &self.shown {
             // The session will say the same.
             self.setup.course.turn(shown.snapshot.update, beta);
+            self.preset = None;
             self.promise = None;
             self.view.sought = None;
             self.send(Command::Continue { beta });
@@ -378,7 +394,8 @@ impl App {
 
     /// Shows another moment of the run.
     pub fn seek(&mut self, update: u32) {
-        let Some(shown) = &self.shown else { return };
+        let Some(shown) = &mut self.shown else { return };
+        shown.remember_end();
         let update = update.min(shown.snapshot.recorded);
         let run = shown.snapshot.run;
         if shown.snapshot.state != RunState::Given && self.view.sought.unwrap_or(shown.snapshot.update) != update {
@@ -581,9 +598,11 @@ impl App {
         let points = std::mem::take(&mut snapshot.curve);
         if let Some(started) = self.begun.take_if(|begun| begun.run == snapshot.run) {
             let past = self.past_of(&started);
+            self.view.sought = None;
             self.shown = Shown::new(started, snapshot, [past, points].concat(), self.taken);
         } else if let Some(shown) = self.shown.as_mut().filter(|shown| shown.started.run == snapshot.run) {
             shown.curve.extend(points);
+            shown.remember_end();
             shown.snapshot = snapshot;
             shown.version = self.taken;
         }
@@ -595,8 +614,12 @@ impl App {
     fn past_of(&mut self, started: &Started) -> Vec<CurvePoint> {
         let Some((run, update)) = started.branch_of else { return Vec::new() };
         match self.shown.take_if(|shown| shown.started.run == run) {
-            Some(shown) => {
+            Some(mut shown) => {
                 let past = shown.curve.iter().filter(|point| point.update <= update).copied().collect();
+                // As it was in the end, not where it was left.
+                if let Some(end) = shown.end.take() {
+                    shown.snapshot = *end;
+                }
                 self.keep(shown);
                 past
             }

@@ -9,7 +9,7 @@ use super::panels::{self, Ground, Panel, Plan, Touched};
 use super::theme::{self, GAP, NARROW};
 use super::{chart, inspector, timeline};
 use crate::experiment::CurvePoint;
-use crate::lab::{Snapshot, Started};
+use crate::lab::{RunState, Snapshot, Started};
 use crate::mdp::Grid;
 
 /// A run as it is shown: its grid, its latest snapshot and its curve so far.
@@ -18,6 +18,8 @@ pub struct Shown {
     pub started: Started,
     pub snapshot: Snapshot,
     pub curve: Vec<CurvePoint>,
+    /// The run at its last update, where an earlier one is shown.
+    pub end: Option<Box<Snapshot>>,
     /// Another one for every snapshot there ever was on the page.
     pub version: u64,
     pub grid: Grid,
@@ -31,7 +33,14 @@ impl Shown {
     pub fn new(started: Started, snapshot: Snapshot, curve: Vec<CurvePoint>, version: u64) -> Option<Shown> {
         let given = started.setup.ensemble.as_ref().map(|ensemble| &ensemble.grid);
         let grid = Grid::new(given.unwrap_or(&started.setup.grid).clone()).ok()?;
-        Some(Shown { started, snapshot, curve, version, grid })
+        Some(Shown { started, snapshot, curve, end: None, version, grid })
+    }
+
+    /// Keeps the snapshot for when another moment is shown, where it is the last there is.
+    pub fn remember_end(&mut self) {
+        if self.snapshot.update == self.snapshot.recorded && self.snapshot.state != RunState::Playing {
+            self.end = Some(Box::new(self.snapshot.clone()));
+        }
     }
 
     pub fn grid(&self) -> &Grid {

@@ -76,7 +76,7 @@ pub static COMMANDS: [Command; 24] = [
         icon: Some(Icon::Reset),
         keys: &[key(Key::R)],
         can: can_train,
-        run: |app, _| app.send(ToSession::Reset),
+        run: |app, _| app.reset(),
     },
     Command {
         name: "earlier",

@@ -7,6 +7,7 @@ use super::board::Shown;
 use super::numbers;
 use super::theme::{self, Palette};
 use super::widgets::{Icon, icon_button};
+use crate::experiment::PRESETS;
 use crate::mdp::RETURN_KINDS;
 
 /// A run that is kept as it was last seen.
@@ -14,6 +15,8 @@ pub struct Kept {
     pub shown: Shown,
     /// What tells it from the others.
     pub name: String,
+    /// The file that its ensemble is from.
+    file: Option<String>,
 }
 
 /// Most runs that are kept; the oldest gives way.
@@ -31,7 +34,8 @@ impl App {
         let name = name(&shown);
         // The same moment of the same run twice says nothing.
         self.kept.retain(|kept| kept.name != name || kept.shown.snapshot.digest != shown.snapshot.digest);
-        self.kept.push(Kept { shown, name });
+        let file = self.opened.clone().filter(|_| shown.started.setup.ensemble.is_some());
+        self.kept.push(Kept { shown, name, file });
         if self.kept.len() > MOST {
             self.kept.remove(0);
         }
@@ -39,13 +43,20 @@ impl App {
 
     /// Brings a kept run back: it is trained again, to the same digest.
     fn bring_back(&mut self, index: usize) {
-        let Kept { shown, .. } = &self.kept[index];
+        let Kept { shown, file, .. } = &self.kept[index];
+        let file = file.clone();
         let snapshot = &shown.snapshot;
         let mut setup = shown.started.setup.clone();
         setup.course = snapshot.course.clone();
         let promise = super::app::Promise { update: Some(snapshot.update), digest: Some(snapshot.digest) };
         let is_trained = setup.ensemble.is_none();
-        self.begin(setup, None);
+        let text = setup.ensemble.as_ref().and_then(|ensemble| serde_json::to_string(ensemble).ok());
+        let preset = PRESETS.iter().position(|preset| (preset.setup)() == setup);
+        self.begin(setup, preset);
+        if let (Some(name), Some(text)) = (&file, text) {
+            self.notice = self.keep_file(name, &text).err();
+        }
+        self.opened = file;
         self.promise = Some(promise).filter(|_| is_trained);
     }
 }
@@ -78,7 +89,10 @@ pub fn show(ui: &mut Ui, app: &mut App) {
         ui.add(egui::Label::new(RichText::new(text).small().color(color)).extend());
     };
     let mut buttons = |ui: &mut Ui, index: usize, name: &str| {
-        let response = ui.small_button("Show again").on_hover_text("Trains it again, to the same digest");
+        let button = egui::Button::new("Show again");
+        let response = ui
+            .add(if is_narrow { button } else { button.small() })
+            .on_hover_text("Trains it again, to the same digest");
         if response.accessible_name(format!("Show again: {name}")).clicked() {
             brought = Some(index);
         }

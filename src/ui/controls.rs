@@ -163,7 +163,7 @@ fn show_field(ui: &mut Ui, field: &Field, explains: bool, config: &mut Config) {
                         ui.end_row();
                         let sentence = format!("{text:?}: expected {expected}.");
                         ui.label(RichText::new(sentence).small().color(palette.warning));
-                        if ui.small_button("undo").clicked() {
+                        if ui.button("undo").clicked() {
                             ui.data_mut(|data| data.remove_temp::<String>(id));
                         }
                     }

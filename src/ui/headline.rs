@@ -64,7 +64,7 @@ fn beta(ui: &mut Ui, app: &mut App, width: f32) {
         ui.horizontal(|ui| {
             ui.label(RichText::new("β").text_style(theme::figure()));
             ui.spacing_mut().slider_width = ui.available_width() - 76.0;
-            ui.spacing_mut().interact_size.y = 36.0;
+            ui.spacing_mut().interact_size.y = ui.spacing().interact_size.y.max(36.0);
             ui.spacing_mut().slider_rail_height = 8.0;
             let mut beta = app.setup().last_beta();
             let slider = Slider::new(&mut beta, 0.0..=1.0)
@@ -192,7 +192,8 @@ fn sentence(app: &App) -> String {
     let theirs = format!("{} clone ({})", if n == 1 { "its" } else { "their" }, headline.cloner);
     match (is_lost(ensemble), is_lost(clone)) {
         (false, true) => {
-            let lost = format!("{theirs} gets lost: it arrives in {} of episodes", share(clone));
+            let often = if clone.success < 0.5 { "" } else { "often " };
+            let lost = format!("{theirs} {often}gets lost: it arrives in {} of episodes", share(clone));
             format!("{experts} {reach} the goal in {} steps; {lost}.", steps(ensemble))
         }
         (false, false) => {

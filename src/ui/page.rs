@@ -114,6 +114,31 @@ impl App {
         ui.scope(|ui| toolbar::show(ui, self));
         ui.add_space(2.0);
         self.show_messages(ui);
+        if self.is_new {
+            self.welcome(ui);
+        }
+    }
+
+    /// What a visitor is told who comes for the first time.
+    fn welcome(&mut self, ui: &mut Ui) {
+        let (mut learns, mut leaves) = (false, self.view.tab == Tab::Learn);
+        theme::card(ui).show(ui, |ui| {
+            ui.horizontal_wrapped(|ui| {
+                let text = "New here? These experts are trained to reach the flag while whoever clones them gets lost. Ten short steps show how, and when it cannot work.";
+                ui.label(text);
+                let start = egui::Button::new(RichText::new("Start the lesson").color(Palette::of(ui).on_accent));
+                learns = ui.add(start.fill(Palette::of(ui).accent)).clicked();
+                leaves |= ui.button("Not now").clicked();
+            });
+        });
+        if learns {
+            self.view.tab = Tab::Learn;
+        }
+        if learns || leaves {
+            self.is_new = false;
+            // Where nothing can be kept, it is said again at the next visit.
+            let _ = self.host.keep("visited", "yes");
+        }
     }
 
     fn show_headline(&mut self, ui: &mut Ui) {

@@ -1,6 +1,6 @@
 //! The timeline: every update of the run, to go back to and to go on from.
 
-use egui::{DragValue, RichText, Slider, Ui};
+use egui::{DragValue, Key, RichText, Slider, Ui};
 
 use super::app::View;
 use super::board::Shown;
@@ -48,7 +48,15 @@ pub fn show(ui: &mut Ui, shown: &Shown, view: &View, touched: &mut Touched) {
         }
         let slider = Slider::new(&mut update, 0..=snapshot.recorded.max(1)).show_value(false);
         let help = "Every update of the run: drag, and everything on the page is as it was then (Left and Right; with Shift fifty)";
-        ui.add(slider).accessible_name("Timeline").on_hover_text(help);
+        let response = ui.add(slider).accessible_name("Timeline").on_hover_text(help);
+        // The slider itself knows steps of one.
+        let by = |key| ui.input(|input| if input.modifiers.shift && input.key_pressed(key) { 50 } else { 0 });
+        if response.has_focus() {
+            let (less, more) = (by(Key::ArrowLeft), by(Key::ArrowRight));
+            if less + more > 0 {
+                update = (now + more).saturating_sub(less).min(snapshot.recorded);
+            }
+        }
         if icon_button(ui, Icon::Later, "One update on", false).clicked() {
             update = (now + 1).min(snapshot.recorded);
         }

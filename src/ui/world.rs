@@ -31,8 +31,9 @@ pub struct WorldTab {
     last: Option<Cell>,
     /// The cell that the keyboard acts on.
     cursor: Cell,
-    /// Worlds before the last edits.
+    /// Worlds before the last edits, and the one that they led to.
     before: Vec<GridSpec>,
+    known: Option<GridSpec>,
     /// Why the last edit was not made, or not all of it.
     refusal: Option<String>,
 }
@@ -45,6 +46,11 @@ impl WorldTab {
         heading(ui, 2, RichText::new("World").heading());
         let text = "Draw walls and take them away, drag the flag: the experts are trained anew in what you drew.";
         ui.label(RichText::new(text).color(Palette::of(ui).muted));
+        // What was changed elsewhere cannot be undone here.
+        if self.known.as_ref() != Some(&app.setup().grid) {
+            self.before.clear();
+            self.known = Some(app.setup().grid.clone());
+        }
         self.show_controls(ui, app);
         let is_narrow = ui.ctx().content_rect().width() < NARROW;
         let grid = self.draft.clone().unwrap_or_else(|| app.setup().grid.clone());
@@ -103,8 +109,11 @@ impl WorldTab {
                 ui.end_row();
             }
             ui.spacing_mut().slider_width = 90.0;
-            let slip =
-                Slider::new(&mut grid.slip, 0.0..=0.9).step_by(0.05).fixed_decimals(2).update_while_editing(false);
+            let slip = Slider::new(&mut grid.slip, 0.0..=0.9)
+                .step_by(0.05)
+                .fixed_decimals(2)
+                .clamping(egui::SliderClamping::Edits)
+                .update_while_editing(false);
             let tip = "ε: with this probability the move that is made is drawn from all five instead (paper: 0)";
             ui.add(slip).accessible_name("Slip").on_hover_text(tip);
             ui.label(RichText::new("slip").small().color(Palette::of(ui).muted));
@@ -115,6 +124,7 @@ impl WorldTab {
                 && let Some(before) = self.before.pop()
             {
                 self.refusal = app.change_world(before).err();
+                self.known = Some(app.setup().grid.clone());
             }
             let has_walls = !app.setup().grid.walls.is_empty();
             if ui.add_enabled(has_walls, egui::Button::new("No walls")).clicked() {
@@ -140,6 +150,10 @@ impl WorldTab {
         }
         self.refusal = app.change_world(grid).err().map(|error| format!("Not done: {error}."));
         if self.refusal.is_none() {
+            if self.known.as_ref() != Some(&before) {
+                self.before.clear();
+            }
+            self.known = Some(app.setup().grid.clone());
             self.before.push(before);
             if self.before.len() > MOST_UNDONE {
                 self.before.remove(0);

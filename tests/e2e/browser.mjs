@@ -56,10 +56,12 @@ export function launch(...more) {
 /**
  * Opens the page; `problems` collects all that the console and the page complain about. With `offline`, its service
  * worker is let in; otherwise the browser has none to offer, as `page.route` does not see what a service worker fetches.
+ * With `isNew` the visitor comes for the first time.
  */
-export async function open(browser, address, { before, offline, ...options } = {}) {
+export async function open(browser, address, { before, offline, isNew, ...options } = {}) {
   const context = await browser.newContext({ viewport: { width: 1280, height: 800 }, ...options });
   if (!offline) await context.addInitScript(() => delete Navigator.prototype.serviceWorker);
+  if (!isNew) await context.addInitScript(() => localStorage.setItem("ape-lab.visited", "yes"));
   const page = await context.newPage();
   const problems = [];
   page.on("pageerror", (error) => problems.push(String(error)));

@@ -32,9 +32,11 @@ async function copyLink(page) {
 const live = (page) => page.locator("#mirror").getByText("On this page now").first().waitFor(PATIENCE);
 
 test("the whole lesson: every step sets its stage and says what is on the page", async () => {
-  const { page, problems, close } = await open(browser, site.address);
+  const { page, problems, close } = await open(browser, site.address, { isNew: true });
   await trained(page);
-  await click(page, "radio", "Tab: Learn");
+  // Who comes for the first time is shown the way.
+  await page.screenshot({ path: SHOTS + "new-1280x800-light.png" });
+  await click(page, "button", "Start the lesson");
   await page.getByRole("heading", { name: "One expert has no secrets" }).waitFor(PATIENCE);
   await says(page, /^The expert returns −10\.\d, the clone \(uniform\) −10\.\d \(capped\)/);
   const next = async (title) => {
@@ -56,8 +58,8 @@ test("the whole lesson: every step sets its stage and says what is on the page",
   await click(page, "button", "Show this step again");
   await until(() => widget(page, "slider", "β").getAttribute("aria-valuenow"), (beta) => beta === "0.6");
   await next("Why the clone wanders");
-  await says(page, /^Row 5, column 5\. Expert 1: .* Clone \(uniform\) with p\(1\|s\) = 0\.50, p\(2\|s\) = 0\.50/);
-  await says(page, "Cell in row 5, column 5");
+  await says(page, /^Row 3, column 4\. Expert 1: .* Clone \(uniform\) with p\(1\|s\) = 0\.50, p\(2\|s\) = 0\.50/);
+  await says(page, "Cell in row 3, column 4");
   await page.screenshot({ path: SHOTS + "learn-1280x800-light.png" });
   await next("A little for the experts, a lot for the clone");
   await says(page, /^Within T the ensemble needs \d\.\d steps more than the best, the clone 8\d\.\d/);
@@ -197,7 +199,7 @@ test("back in time, on with another β, and the run that was left is kept", asyn
   await other.close();
   // And the run that was left, from what was kept.
   await click(page, "button", /^Show again: β 0\.6/);
-  await until(() => status(page).textContent(), (text) => text.startsWith(`paused at update ${update} of`));
+  await until(() => digest(page), (now) => now === end);
   assert.deepEqual(problems, []);
   await close();
 });
@@ -237,6 +239,7 @@ test("a broken or old link gets a sentence and the default", async () => {
     ["beta=0.1", "it does not begin with v=1"],
     ["v=1&walls=0:1;1:0", "cannot reach the goal"],
     ["v=1&tab=nowhere", "tab=nowhere: expected one of learn, train"],
+    ["v=1&at=5000", "at=5000: expected an update of the run, 0 to 732"],
     ["v=1&step=99", "step=99: expected a number from 1 to 10"],
     ["v=1&experts=%E2%82", "experts"],
     ["v=1&" + "x".repeat(60_000) + "=1", "characters long"],
@@ -256,6 +259,8 @@ test("a broken or old link gets a sentence and the default", async () => {
   await until(() => widget(page, "slider", "β").getAttribute("aria-valuenow"), (beta) => beta === "0.2");
   await page.evaluate(() => (location.hash = "v=1&seed=none"));
   await page.getByRole("alert").filter({ hasText: "seed=none: expected a whole number" }).waitFor(PATIENCE);
+  // And the address is put right.
+  await until(async () => page.url(), (url) => url.endsWith("#v=1&digest=7d910218bdefe52c"));
   await close();
 });
 

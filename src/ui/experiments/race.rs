@@ -132,11 +132,16 @@ impl RaceTab {
 
     /// Takes in news of the race under way.
     pub fn hear(&mut self, id: TaskId, event: &TaskEvent, now: f64) {
+        let start = self.start();
         let Some((subject, batch)) = &mut self.batch else { return };
         batch.hear(id, event, now);
         let Some(Outcome::Race(raced)) = batch.outcomes().next() else { return };
         let held = Rc::new(Held { subject: subject.clone(), luck: self.luck, raced: (**raced).clone() });
         self.batch = None;
+        // Who has moved the start meanwhile does not want a race from the old one.
+        if start != Some(held.subject.start) {
+            return;
+        }
         let is_same = |other: &Option<Rc<Held>>| other.as_ref().is_some_and(|other| other.subject == held.subject);
         let is_many = held.raced.episodes > 1;
         // What was found in a thousand episodes stays, as long as it is of the same racers.

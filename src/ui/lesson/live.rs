@@ -95,11 +95,13 @@ pub fn identity(app: &App) -> Option<String> {
     let steps: f64 = starts.iter().map(|&s| f64::from(clone.view.hitting_time[s as usize])).sum();
     let steps = steps / starts.len() as f64;
     Some(format!(
-        "Left: the honest clone takes {} steps, computed from its own policy. Right: D = {}, and {} for what was cut off: together {}.",
+        "Left: the honest clone takes {} steps, computed from its own policy. Right: D = {}, and {} for what was cut off: together {}. (Means over the {} cells where episodes start. The paper's returns count the goal, too, with 0: {}.)",
         numbers::short(steps),
         numbers::short(demonstrated),
         numbers::short(rest),
         numbers::short(demonstrated + rest),
+        starts.len(),
+        numbers::short(-steps * starts.len() as f64 / grid.free_cells() as f64),
     ))
 }
 

@@ -15,6 +15,7 @@ use super::theme::{self, Palette};
 use super::widgets::heading;
 use crate::attack::AttackerChoice;
 use crate::experiment::{PRESETS, Setup};
+use crate::lab::{Command, RunState};
 use crate::mdp::RETURN_KINDS;
 
 /// One step of the lesson.
@@ -74,7 +75,8 @@ pub fn show(ui: &mut Ui, app: &mut App) {
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing.x = 3.0;
         ui.spacing_mut().button_padding.x = 2.0;
-        let width = ((ui.available_width() - 3.0 * 9.0) / STEPS.len() as f32).floor().min(40.0);
+        let least = if ui.ctx().content_rect().width() < theme::NARROW { 40.0 } else { 0.0 };
+        let width = ((ui.available_width() - 3.0 * 9.0) / STEPS.len() as f32).floor().clamp(least, 40.0_f32.max(least));
         for (index, other) in STEPS.iter().enumerate() {
             let button = egui::Button::selectable(index == step, (index + 1).to_string()).frame_when_inactive(true);
             let response = ui.add(button.min_size(vec2(width, 0.0)));
@@ -140,24 +142,39 @@ pub fn show(ui: &mut Ui, app: &mut App) {
     }
 }
 
-/// Whether the run that the step talks about is there.
+/// Whether what the step talks about is there.
 fn is_on_stage(app: &App) -> bool {
-    *app.setup() == (STEPS[app.view.step].scene.setup)()
+    let scene = &STEPS[app.view.step].scene;
+    let is_back = app.shown().is_some_and(|(_, snapshot)| snapshot.state == RunState::Paused);
+    *app.setup() == (scene.setup)() && app.view.clones == scene.clones() && app.view.kind == scene.kind() && !is_back
+}
+
+impl Scene {
+    fn clones(&self) -> Vec<AttackerChoice> {
+        self.clones.iter().filter_map(|name| name.parse().ok()).collect()
+    }
+
+    fn kind(&self) -> usize {
+        RETURN_KINDS.iter().position(|kind| kind.name == self.kind).unwrap_or(0)
+    }
 }
 
 /// Puts on the page what the step talks about; a run that is there already is not trained again.
 fn set_stage(app: &mut App) {
-    let Scene { setup, clones, kind, mark } = &STEPS[app.view.step].scene;
-    let setup = setup();
+    let scene = &STEPS[app.view.step].scene;
+    let setup = (scene.setup)();
     let cols = setup.grid.cols;
     if setup != *app.setup() {
         let preset = PRESETS.iter().position(|preset| (preset.setup)() == setup);
         app.begin(setup, preset);
+    } else if let Some((_, snapshot)) = app.shown().filter(|(_, snapshot)| snapshot.state == RunState::Paused) {
+        // The visitor has looked back, or stopped on the way.
+        let is_whole = snapshot.recorded >= snapshot.last_update;
+        if is_whole { app.seek(u32::MAX) } else { app.send(Command::Play) }
     }
-    let clones: Vec<AttackerChoice> = clones.iter().filter_map(|name| name.parse().ok()).collect();
-    app.show_clones(clones);
-    app.view.kind = RETURN_KINDS.iter().position(|other| other.name == *kind).unwrap_or(0);
-    app.view.cell = match *mark {
+    app.show_clones(scene.clones());
+    app.view.kind = scene.kind();
+    app.view.cell = match scene.mark {
         Mark::None => None,
         Mark::Cell(row, col) => Some((row * cols + col) as usize),
     };

@@ -89,7 +89,7 @@ pub static STEPS: [Step; 10] = [
                 "J of theta is the expected return of the ensemble minus beta times the expected return of the clone. Equation 3 of the paper.",
             ),
             Text(
-                "The page climbs J by policy gradient, 732 updates in a fraction of a second. At β = 0.6 the experts cross the grid by different \
+                "The page climbs J by policy gradient, as the paper does, in 732 updates. At β = 0.6 the experts cross the grid by different \
                   ways, and the clone that weighs them equally gets lost.",
             ),
             Live(live::clone_and_ensemble),
@@ -100,17 +100,17 @@ pub static STEPS: [Step; 10] = [
     },
     Step {
         title: "Why the clone wanders",
-        scene: Scene { setup: parted, clones: &["uniform", "occupancy"], kind: CAPPED, mark: Mark::Cell(5, 5) },
+        scene: Scene { setup: parted, clones: &["uniform", "occupancy"], kind: CAPPED, mark: Mark::Cell(3, 4) },
         blocks: &[
             Text(
-                "Look at one cell, marked in every panel. Each expert knows where it wants to go. The blind clone gives both the same weight, so it \
-                  tosses a coin: a step one way, then a step back.",
+                "Look at one cell, marked in every panel. Each expert knows where it wants to go, and they want opposite ways. The blind clone gives \
+                  both the same weight, so it tosses a coin: a step one way, then perhaps a step back.",
             ),
             Math(r"p(c \mid s) = \frac{1}{n}", "p of c given s is one over n."),
             Live(live::one_cell),
             Text(
-                "Two good policies, mixed cell by cell, are a bad one, because neither is followed for two steps in a row. An expert is consistent \
-                  over an episode; a mixture is not.",
+                "Two good policies, mixed cell by cell, can be a bad one: what one expert has begun the other undoes. An expert is consistent over an \
+                  episode; a mixture that tosses anew at each step is not. (Where experts agree, as in step 2, mixing does no harm.)",
             ),
             Try(
                 "Point at cells where the clone is purple, then where it is not: near the flag the experts must agree, or be slow themselves.",
@@ -127,8 +127,8 @@ pub static STEPS: [Step; 10] = [
             ),
             Live(live::price),
             Text(
-                "The paper reports −16.2 for the ensemble and −44.3 for the clone at β = 0.6. The tab “Table 1” makes the whole comparison, beside \
-                  the paper's own figures.",
+                "The paper, against an observer that estimates p(c|s) from recent episodes, reports −16.2 for the ensemble and −44.3 for the clone, both \
+                  capped returns (step 8 says what that hides). The tab “Table 1” makes the whole comparison, beside the paper's own figures.",
             ),
             Try("Let the three race from one cell, and then a thousand times."),
             Go(Tab::Race, "To the race"),
@@ -136,7 +136,7 @@ pub static STEPS: [Step; 10] = [
     },
     Step {
         title: "But who is the observer?",
-        scene: Scene { setup: honest, clones: &["occupancy", "uniform"], kind: CAPPED, mark: Mark::Cell(5, 5) },
+        scene: Scene { setup: honest, clones: &["occupancy", "uniform"], kind: CAPPED, mark: Mark::Cell(3, 4) },
         blocks: &[
             Text(
                 "So far the clone weighed the experts equally, everywhere. Nobody has to. Whoever clones the demonstrations themselves \
@@ -151,7 +151,10 @@ pub static STEPS: [Step; 10] = [
                   on the page were trained against it, with the same β = 0.6. The effect has vanished: the clone is as good as they are.",
             ),
             Live(live::clone_and_ensemble),
-            Try("Move β as far as you like."),
+            Try(
+                "Move β up to 1: clone and ensemble stay together. (At 1 there is nothing left to climb, as J = (1 − β) E[ensemble] when both are equal; \
+                 beyond 1 the experts would be paid for being slow themselves.)",
+            ),
         ],
     },
     Step {
@@ -159,8 +162,8 @@ pub static STEPS: [Step; 10] = [
         scene: Scene { setup: parted, clones: &["uniform", "occupancy"], kind: WITHIN, mark: Mark::None },
         blocks: &[
             Text(
-                "These are the parted experts again, at β = 0.6, and beside the blind clone stands the honest one. Let D be the mean length of the \
-                  demonstrations, at most T steps each, m(s) the share of them that are cut off by T at s, and h(s) the honest clone's expected \
+                "These are the parted experts again, at β = 0.6, and beside the blind clone stands the honest one. Let D be the mean length of \
+                  infinitely many demonstrations, at most T steps each, m(s) the share of them that are cut off by T at s, and h(s) the honest clone's expected \
                   steps from there. Then",
             ),
             Math(
@@ -173,7 +176,7 @@ pub static STEPS: [Step; 10] = [
             ),
             Live(live::identity),
             Text(
-                "So no β, no number of experts and no training can keep out an honest cloner, as long as the experts arrive.",
+                "So no β, no number of experts and no training can keep out an honest cloner, as long as the experts arrive within T.",
             ),
         ],
     },
@@ -201,7 +204,7 @@ pub static STEPS: [Step; 10] = [
     },
     Step {
         title: "A clone that remembers",
-        scene: Scene { setup: parted, clones: &["uniform", "history"], kind: WITHIN, mark: Mark::Cell(5, 5) },
+        scene: Scene { setup: parted, clones: &["uniform", "history"], kind: WITHIN, mark: Mark::Cell(3, 4) },
         blocks: &[
             Text(
                 "Back to the parted experts and the blind clone. A cloner may also remember its own episode. It asks: of the experts, who would have \
@@ -227,7 +230,7 @@ pub static STEPS: [Step; 10] = [
         blocks: &[
             Text(
                 "The pair on the page is the whole story: the same two experts, a clone that is lost and a clone that is not. The ensemble protects \
-                  against an observer who weighs its experts wrongly: equally at each cell, or from few and stale demonstrations. It does not protect \
+                  against an observer who weighs its experts wrongly: equally at each cell, say. It does not protect \
                   against one who clones what was shown, nor one who remembers.",
             ),
             Text(
