@@ -1,6 +1,8 @@
 //! Everything that can be done with a word or a key: one table for buttons, menus, shortcuts, the palette and the help.
 
-use egui::{Context, Frame, Key, KeyboardShortcut, Modal, Modifiers, RichText, ScrollArea, TextEdit, Ui};
+use egui::{
+    Context, Event, Frame, InputState, Key, KeyboardShortcut, Modal, Modifiers, RichText, ScrollArea, TextEdit, Ui,
+};
 
 use super::app::{App, TABS, Tab, Wanted};
 use super::theme::Palette;
@@ -346,11 +348,7 @@ pub fn listen(ctx: &Context, app: &mut App) {
                 [Key::Space, Key::ArrowLeft, Key::ArrowRight, Key::ArrowUp, Key::ArrowDown, Key::Home, Key::End];
             let is_taken =
                 (has_focus && OF_WIDGETS.contains(&keys.logical_key)) || (is_blocked && command.name != "help");
-            // Exactly these modifiers, but for Ctrl or Cmd.
-            let is_pressed = !is_taken
-                && ctx.input_mut(|input| {
-                    (keys.modifiers.command || input.modifiers == keys.modifiers) && input.consume_shortcut(keys)
-                });
+            let is_pressed = !is_taken && ctx.input_mut(|input| take_key(input, keys));
             if is_pressed && (command.can)(app) {
                 (command.run)(app, ctx);
                 // What it changed is drawn in the next frame.
@@ -365,6 +363,16 @@ pub fn listen(ctx: &Context, app: &mut App) {
             ctx.request_repaint();
         }
     }
+}
+
+/// Whether these keys were pressed, with exactly these modifiers at that moment; nobody else hears of it then.
+fn take_key(input: &mut InputState, keys: &KeyboardShortcut) -> bool {
+    let before = input.events.len();
+    input.events.retain(|event| {
+        !matches!(event, Event::Key { key, pressed: true, modifiers, .. }
+            if *key == keys.logical_key && modifiers.matches_exact(keys.modifiers))
+    });
+    input.events.len() < before
 }
 
 /// Every shortcut with what it does, for the help.
