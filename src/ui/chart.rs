@@ -198,7 +198,10 @@ pub fn show(ui: &mut Ui, size: Vec2, shown: &Shown, kept: &[Kept], view: &View) 
     }
     let unit = if kind.is_steps { "steps" } else { "probability" };
     let title = format!("Over training, {} ({unit}):", kind.label);
-    legend(ui, &title, curves.iter().map(|curve| (&*curve.name, curve.color)));
+    let names = curves.iter().map(|curve| (&*curve.name, curve.color));
+    // Of a kept run the upper line is the ensemble's, the lower the clone's.
+    let kept_names = kept.iter().enumerate().map(|(index, kept)| (&*kept.name, palette.kept(index)));
+    legend(ui, &title, names.chain(kept_names));
     let moves = config.alpha.is_some();
     let size = vec2(size.x, size.y - (ui.cursor().top() - top));
     let below = if moves { (0.3 * size.y).max(60.0) } else { 0.0 };

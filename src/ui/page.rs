@@ -123,13 +123,23 @@ impl App {
     fn welcome(&mut self, ui: &mut Ui) {
         let (mut learns, mut leaves) = (false, self.view.tab == Tab::Learn);
         theme::card(ui).show(ui, |ui| {
-            ui.horizontal_wrapped(|ui| {
-                let text = "New here? These experts are trained to reach the flag while whoever clones them gets lost. Ten short steps show how, and when it cannot work.";
-                ui.label(text);
-                let start = egui::Button::new(RichText::new("Start the lesson").color(Palette::of(ui).on_accent));
-                learns = ui.add(start.fill(Palette::of(ui).accent)).clicked();
+            ui.set_width(ui.available_width());
+            let text = "New here? These experts are trained to reach the flag while whoever clones them gets lost. \
+                        Ten short steps show how, and when it cannot work.";
+            let mut buttons = |ui: &mut Ui| {
+                let start = RichText::new("Start the lesson").color(Palette::of(ui).on_accent);
+                learns = ui.add(egui::Button::new(start).fill(Palette::of(ui).accent)).clicked();
                 leaves |= ui.button("Not now").clicked();
-            });
+            };
+            if ui.available_width() < WIDE {
+                ui.label(text);
+                ui.horizontal(buttons);
+            } else {
+                ui.horizontal(|ui| {
+                    ui.label(text);
+                    buttons(ui);
+                });
+            }
         });
         if learns {
             self.view.tab = Tab::Learn;
