@@ -10,15 +10,14 @@ use super::experiments::table1::Table1Tab;
 use super::heatmap::Pictures;
 use super::host::Host;
 use super::settings::Preferences;
+use super::slow_clones::SlowClones;
 use super::world::WorldTab;
 use super::{theme, toolbar};
 use crate::ape::observer::ObserverChoice;
 use crate::ape::{Config, EnsembleFile};
 use crate::attack::AttackerChoice;
-use crate::experiment::{Course, CurvePoint, Denied, Outcome, PRESETS, Setup, Task};
-use crate::lab::{
-    CloneView, Command, Event, Exported, Link, PROTOCOL, Pool, RunState, Snapshot, Started, TaskEvent, TaskId,
-};
+use crate::experiment::{Course, CurvePoint, Denied, PRESETS, Setup};
+use crate::lab::{Command, Event, Exported, Link, PROTOCOL, Pool, RunState, Snapshot, Started};
 use crate::mdp::GridSpec;
 
 /// What moving β does.
@@ -111,7 +110,7 @@ pub struct App {
     /// The place in [`PRESETS`] that `setup` was taken from, as long as nothing was changed since.
     pub(super) preset: Option<usize>,
     /// A run that has begun and shown nothing yet.
-    begun: Option<Started>,
+    pub(super) begun: Option<Started>,
     /// What is on the page: a run, its grid, its latest snapshot and its curve so far.
     pub(super) shown: Option<Shown>,
     /// A sentence from the session about something it would not do.
@@ -138,15 +137,13 @@ pub struct App {
     pub(super) address: (String, f64),
     /// What the next ensembles from the session are for.
     wanted: Vec<Wanted>,
-    /// Clones being made that are not quick, and those that were, each with the run and update it is of.
-    making: Vec<(TaskId, (u32, u32), AttackerChoice)>,
-    made: Vec<((u32, u32), CloneView)>,
+    pub(super) slow_clones: SlowClones,
     /// Name of the file that the ensemble on the page was read from.
     pub opened: Option<String>,
     /// The page's clock, in seconds.
     pub(super) now: f64,
     /// Snapshots taken in, over all sessions.
-    taken: u64,
+    pub(super) taken: u64,
     /// A snapshot that has come and not been drawn yet.
     pub(super) undrawn: Option<u32>,
 }
@@ -210,8 +207,7 @@ impl App {
             table1: Table1Tab::default(),
             sweep: SweepTab::default(),
             wanted: Vec::new(),
-            making: Vec::new(),
-            made: Vec::new(),
+            slow_clones: SlowClones::default(),
             opened: None,
             now: 0.0,
             taken: 0,
@@ -454,8 +450,7 @@ impl App {
                     self.session = Session::Ready;
                     // Of a session that is gone nothing comes any more, and its runs had other numbers.
                     self.wanted.clear();
-                    self.made.clear();
-                    self.making.drain(..).for_each(|(id, ..)| self.pool.cancel(id));
+                    self.slow_clones.clear(&mut self.pool);
                     self.send(Command::Speed(toolbar::SPEEDS[self.view.speed]));
                     self.send(Command::Show(self.view.clones.clone()));
                     self.send_setup();
@@ -516,78 +511,6 @@ impl App {
                 }
                 Wanted::Clones => self.make_clones(&exported),
             }
-        }
-    }
-
-    /// Begins to make the clones on the page that are not quick, where they are not there for this moment.
-    fn make_clones(&mut self, exported: &Exported) {
-        let moment = (exported.run, exported.update);
-        for attacker in self.slow_clones() {
-            let is_made = self.made.iter().any(|(of, clone)| *of == moment && clone.cloner == attacker);
-            let is_being_made = self.making.iter().any(|(_, of, cloner)| *of == moment && *cloner == attacker);
-            if is_made || is_being_made {
-                continue;
-            }
-            let Config { horizon, seed, .. } = self.setup.config;
-            let ensemble = Box::new(EnsembleFile { config: None, ..exported.file.clone() });
-            let id = self.pool.begin(Task::Attack { ensemble, attacker, horizon, seed });
-            self.making.push((id, moment, attacker));
-        }
-    }
-
-    fn slow_clones(&self) -> Vec<AttackerChoice> {
-        let own = AttackerChoice::of(self.setup.config.observer);
-        let is_slow = |cloner: &AttackerChoice| *cloner != own && !cloner.model().is_quick;
-        self.view.clones.iter().copied().filter(is_slow).collect()
-    }
-
-    /// A clone that is not quick has been made, or not.
-    fn take_clone(&mut self, id: TaskId, event: TaskEvent) {
-        let Some(index) = self.making.iter().position(|(task, ..)| *task == id) else { return };
-        match event {
-            TaskEvent::Ready | TaskEvent::Progress(_) => {}
-            TaskEvent::Failed(sentence) => {
-                self.making.remove(index);
-                self.notice = Some(sentence);
-            }
-            TaskEvent::Done(outcome) => {
-                let (_, moment, cloner) = self.making.remove(index);
-                if let Outcome::Attack(_, cloned) = *outcome {
-                    self.made.push((moment, CloneView::new(cloner, &cloned)));
-                }
-                self.add_made_clones();
-            }
-        }
-    }
-
-    /// Adds the clones that are not quick to the snapshot on the page; where it rests, those that are missing are
-    /// asked for.
-    fn add_made_clones(&mut self) {
-        let slow = self.slow_clones();
-        let Some(shown) = &mut self.shown else { return };
-        let moment = (shown.snapshot.run, shown.snapshot.update);
-        // Of moments gone by nothing is kept.
-        self.made.retain(|(of, _)| *of == moment);
-        self.making.retain(|(id, of, _)| {
-            if *of != moment {
-                self.pool.cancel(*id);
-            }
-            *of == moment
-        });
-        for (_, clone) in &self.made {
-            if !shown.snapshot.clones.iter().any(|other| other.cloner == clone.cloner) {
-                shown.snapshot.clones.push(clone.clone());
-                self.taken += 1;
-                shown.version = self.taken;
-            }
-        }
-        let is_resting = shown.snapshot.state != RunState::Playing && self.begun.is_none();
-        let is_missing = |cloner: &AttackerChoice| {
-            !shown.snapshot.clones.iter().any(|clone| clone.cloner == *cloner)
-                && !self.making.iter().any(|(_, _, making)| making == cloner)
-        };
-        if is_resting && slow.iter().any(is_missing) {
-            self.want(Wanted::Clones);
         }
     }
 

@@ -1,0 +1,100 @@
+//! Clones in the panels that take too long for a frame: made by the pool once training rests, and kept for that moment.
+
+use super::app::{App, Wanted};
+use crate::ape::{Config, EnsembleFile};
+use crate::attack::AttackerChoice;
+use crate::experiment::{Outcome, Task};
+use crate::lab::{CloneView, Exported, Pool, RunState, TaskEvent, TaskId};
+
+/// A run and one of its updates.
+type Moment = (u32, u32);
+
+/// Clones being made that are not quick, and those that were.
+#[derive(Default)]
+pub struct SlowClones {
+    making: Vec<(TaskId, Moment, AttackerChoice)>,
+    made: Vec<(Moment, CloneView)>,
+}
+
+impl SlowClones {
+    /// Forgets them all, done or not.
+    pub fn clear(&mut self, pool: &mut Pool) {
+        self.made.clear();
+        self.making.drain(..).for_each(|(id, ..)| pool.cancel(id));
+    }
+}
+
+impl App {
+    /// Begins to make the clones on the page that are not quick, where they are not there for this moment.
+    pub(super) fn make_clones(&mut self, exported: &Exported) {
+        let moment = (exported.run, exported.update);
+        for attacker in self.wanted_slow_clones() {
+            let is_made = self.slow_clones.made.iter().any(|(of, clone)| *of == moment && clone.cloner == attacker);
+            let is_being_made =
+                self.slow_clones.making.iter().any(|(_, of, cloner)| *of == moment && *cloner == attacker);
+            if is_made || is_being_made {
+                continue;
+            }
+            let Config { horizon, seed, .. } = self.setup.config;
+            let ensemble = Box::new(EnsembleFile { config: None, ..exported.file.clone() });
+            let id = self.pool.begin(Task::Attack { ensemble, attacker, horizon, seed });
+            self.slow_clones.making.push((id, moment, attacker));
+        }
+    }
+
+    fn wanted_slow_clones(&self) -> Vec<AttackerChoice> {
+        let own = AttackerChoice::of(self.setup.config.observer);
+        let is_slow = |cloner: &AttackerChoice| *cloner != own && !cloner.model().is_quick;
+        self.view.clones.iter().copied().filter(is_slow).collect()
+    }
+
+    /// A clone that is not quick has been made, or not.
+    pub(super) fn take_clone(&mut self, id: TaskId, event: TaskEvent) {
+        let Some(index) = self.slow_clones.making.iter().position(|(task, ..)| *task == id) else { return };
+        match event {
+            TaskEvent::Ready | TaskEvent::Progress(_) => {}
+            TaskEvent::Failed(sentence) => {
+                self.slow_clones.making.remove(index);
+                self.notice = Some(sentence);
+            }
+            TaskEvent::Done(outcome) => {
+                let (_, moment, cloner) = self.slow_clones.making.remove(index);
+                if let Outcome::Attack(_, cloned) = *outcome {
+                    self.slow_clones.made.push((moment, CloneView::new(cloner, &cloned)));
+                }
+                self.add_made_clones();
+            }
+        }
+    }
+
+    /// Adds the clones that are not quick to the snapshot on the page; where it rests, those that are missing are
+    /// asked for.
+    pub(super) fn add_made_clones(&mut self) {
+        let slow = self.wanted_slow_clones();
+        let Some(shown) = &mut self.shown else { return };
+        let moment = (shown.snapshot.run, shown.snapshot.update);
+        // Of moments gone by nothing is kept.
+        self.slow_clones.made.retain(|(of, _)| *of == moment);
+        self.slow_clones.making.retain(|(id, of, _)| {
+            if *of != moment {
+                self.pool.cancel(*id);
+            }
+            *of == moment
+        });
+        for (_, clone) in &self.slow_clones.made {
+            if !shown.snapshot.clones.iter().any(|other| other.cloner == clone.cloner) {
+                shown.snapshot.clones.push(clone.clone());
+                self.taken += 1;
+                shown.version = self.taken;
+            }
+        }
+        let is_resting = shown.snapshot.state != RunState::Playing && self.begun.is_none();
+        let is_missing = |cloner: &AttackerChoice| {
+            !shown.snapshot.clones.iter().any(|clone| clone.cloner == *cloner)
+                && !self.slow_clones.making.iter().any(|(_, _, making)| making == cloner)
+        };
+        if is_resting && slow.iter().any(is_missing) {
+            self.want(Wanted::Clones);
+        }
+    }
+}
