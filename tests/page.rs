@@ -220,10 +220,11 @@ fn it_trains_by_itself_and_shows_the_effect() {
     page.get_by(|node| says(node).is_some_and(|text| text.contains("gets lost")));
 }
 
-/// From a phone to a 4K screen every widget lies within the page's width.
+/// From a phone to a 4K screen every widget lies within the page's width, and on a phone a finger can press it.
 #[test]
 fn nothing_is_cut_off() {
     let sizes = [(390.0, 844.0), (730.0, 1000.0), (800.0, 500.0), (1000.0, 700.0), (1280.0, 800.0), (3840.0, 2160.0)];
+    let small = RefCell::new(std::collections::BTreeSet::new());
     for (width, height) in sizes {
         let (mut page, _) = open(width, height);
         let check = |page: &Page, place: &str| {
@@ -233,6 +234,20 @@ fn nothing_is_cut_off() {
                 if !name.is_empty() {
                     let is_inside = bounds.x0 >= -0.5 && bounds.x1 <= f64::from(width) + 0.5;
                     assert!(is_inside, "{width}, {place}: {name:?} {bounds:?}");
+                }
+                // A finger needs room.
+                let role = node.accesskit_node().role();
+                let is_pressed =
+                    [Role::Button, Role::RadioButton, Role::ComboBox, Role::CheckBox, Role::Slider, Role::SpinButton];
+                if width < 720.0 && is_pressed.contains(&role) && !name.starts_with("Sort by") {
+                    let is_large = bounds.height() >= 39.5 && bounds.width() >= 39.5;
+                    if !is_large {
+                        small.borrow_mut().insert(format!(
+                            "{place}: {role:?} {name:?} {:.0}x{:.0}",
+                            bounds.width(),
+                            bounds.height()
+                        ));
+                    }
                 }
             }
         };
@@ -261,6 +276,7 @@ fn nothing_is_cut_off() {
         page.run_steps(4);
         check(&page, "looking back");
     }
+    assert!(small.borrow().is_empty(), "{:#?}", small.borrow());
 }
 
 #[test]
