@@ -61,8 +61,16 @@ impl App {
                         });
                         ui.add_space(GAP);
                     }
-                    self.show_headline(ui);
+                    // What a tab is about comes first; the board is about what the headline says.
+                    let has_board = matches!(self.view.tab, Tab::Train | Tab::Learn);
+                    if has_board {
+                        self.show_headline(ui);
+                    }
                     self.show_tab(ui, Shown::show_stacked);
+                    if !has_board {
+                        ui.add_space(GAP);
+                        self.show_headline(ui);
+                    }
                     ui.add_space(GAP);
                     theme::card(ui).show(ui, |ui| {
                         ui.set_width(ui.available_width());

@@ -166,8 +166,8 @@ impl RaceTab {
         let (width, height) = (ui.available_width(), ui.clip_rect().height() - 8.0);
         if width < NARROW {
             introduce_race(ui);
-            self.show_board(ui, &grid, start, board::size(&grid, width, f32::INFINITY).x);
             self.show_controls(ui, app);
+            self.show_board(ui, &grid, start, board::size(&grid, width, f32::INFINITY).x);
             self.show_racers(ui, app, &grid, f32::INFINITY);
             return;
         }
