@@ -348,9 +348,9 @@ pub fn listen(ctx: &Context, app: &mut App) {
                 [Key::Space, Key::ArrowLeft, Key::ArrowRight, Key::ArrowUp, Key::ArrowDown, Key::Home, Key::End];
             let is_taken =
                 (has_focus && OF_WIDGETS.contains(&keys.logical_key)) || (is_blocked && command.name != "help");
-            let is_pressed = !is_taken && ctx.input_mut(|input| take_key(input, keys));
-            if is_pressed && (command.can)(app) {
-                (command.run)(app, ctx);
+            let presses = if is_taken { 0 } else { ctx.input_mut(|input| take_key(input, keys)) };
+            if presses > 0 && (command.can)(app) {
+                (0..presses).for_each(|_| (command.run)(app, ctx));
                 // What it changed is drawn in the next frame.
                 ctx.request_repaint();
                 return;
@@ -365,14 +365,15 @@ pub fn listen(ctx: &Context, app: &mut App) {
     }
 }
 
-/// Whether these keys were pressed, with exactly these modifiers at that moment; nobody else hears of it then.
-fn take_key(input: &mut InputState, keys: &KeyboardShortcut) -> bool {
+/// How often these keys were pressed since the last frame, with exactly these modifiers at that moment; nobody else
+/// hears of it then.
+fn take_key(input: &mut InputState, keys: &KeyboardShortcut) -> usize {
     let before = input.events.len();
     input.events.retain(|event| {
         !matches!(event, Event::Key { key, pressed: true, modifiers, .. }
             if *key == keys.logical_key && modifiers.matches_exact(keys.modifiers))
     });
-    input.events.len() < before
+    before - input.events.len()
 }
 
 /// Every shortcut with what it does, for the help.

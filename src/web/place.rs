@@ -35,7 +35,10 @@ impl Place {
     }
 
     pub fn visited(&mut self) -> Option<String> {
-        self.visited.borrow_mut().take()
+        let visited = self.visited.borrow_mut().take()?;
+        // That is what stands there now.
+        *self.own.borrow_mut() = visited.clone();
+        Some(visited)
     }
 
     pub fn set(&mut self, fragment: &str) {

@@ -325,7 +325,8 @@ test("the palette finds commands, presets, worlds and tabs", async () => {
   await run("go race");
   await page.getByRole("heading", { name: "Race", exact: true }).waitFor(PATIENCE);
   await press(page, "Control+k");
-  await page.keyboard.type("xyzzy");
+  await widget(page, "dialog", "Find a command").waitFor(PATIENCE);
+  await page.keyboard.type("xyzzy", { delay: 30 });
   await says(page, "Nothing is called “xyzzy”.");
   await press(page, "Escape");
   await until(() => page.getByRole("dialog").count(), (count) => count === 0);

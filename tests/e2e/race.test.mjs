@@ -52,12 +52,7 @@ for (const [colorScheme, viewport] of [
     await trained(page);
     await click(page, "radio", "Tab: Race");
     await page.getByText("Nobody has raced yet").waitFor(PATIENCE);
-    // On a phone the buttons are below the board: scroll to them.
     await page.mouse.move(viewport.width / 2, viewport.height / 2);
-    if (isPhone) {
-      await page.mouse.wheel(0, 500);
-      await page.waitForTimeout(500);
-    }
     await click(page, "button", "Race 1,000");
     await page.getByText(/^Bars: 1,000 episodes/).waitFor(PATIENCE);
     await page.waitForTimeout(1500);
