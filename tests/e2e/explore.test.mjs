@@ -179,12 +179,15 @@ test("back in time, on with another β, and the run that was left is kept", asyn
   // Another β from the middle is a branch.
   await click(page, "slider", "Timeline");
   await until(() => status(page).textContent(), (text) => text.startsWith(`paused at update ${update} of`));
-  const beta = await widget(page, "spinbutton", "β of the branch").boundingBox();
-  await page.mouse.dblclick(beta.x + beta.width / 2, beta.y + beta.height / 2);
-  await page.waitForTimeout(200);
-  await page.keyboard.press("Control+a");
-  await page.keyboard.type("0.1");
+  // A number field is written into once it has turned into one for text.
+  const beta = widget(page, "spinbutton", "β of the branch");
+  const box = await beta.boundingBox();
+  await page.mouse.click(box.x + box.width / 2, box.y + box.height / 2);
+  await until(() => page.evaluate(() => document.activeElement.tagName), (tag) => tag === "INPUT");
+  await press(page, "Control+a");
+  await page.keyboard.type("0.1", { delay: 60 });
   await press(page, "Enter");
+  await until(() => beta.getAttribute("aria-valuenow"), (now) => now === "0.1");
   await click(page, "button", "Continue from here");
   await trained(page);
   await until(() => digest(page), (now) => now !== end);
