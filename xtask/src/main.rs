@@ -223,7 +223,7 @@ fn test(only: &[&str]) -> Result<(), Failure> {
     }
     // What is published is what is tested.
     steps.step("page", "3 minutes at first", &[], build);
-    steps.step("end-to-end", "2 minutes", &[Tool::Chromium, Tool::Node, Tool::NodePackages], || {
+    steps.step("end-to-end", "9 minutes", &[Tool::Chromium, Tool::Node, Tool::NodePackages], || {
         // One at a time: each would slow the other's page down.
         let mut command = program("node", &["--test", "--test-concurrency=1"]);
         command.args(end_to_end_tests()?);
