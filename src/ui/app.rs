@@ -89,6 +89,8 @@ pub struct View {
     pub is_help_open: bool,
     /// Whether the policies stand there as a table.
     pub is_table_open: bool,
+    /// Whether text was being written when the last frame ended.
+    pub is_writing: bool,
     /// Whether the page was last used by keyboard.
     pub is_by_keyboard: bool,
 }
@@ -189,6 +191,7 @@ impl App {
                 staged: None,
                 is_help_open: false,
                 is_table_open: false,
+                is_writing: false,
                 is_by_keyboard: false,
             },
             preferences: Preferences::default(),

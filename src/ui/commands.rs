@@ -337,7 +337,10 @@ pub fn menu_line(ui: &mut Ui, app: &mut App, name: &str) {
 
 /// Does what the keys say. Letters are left to who writes text, arrows and space to who has the focus.
 pub fn listen(ctx: &Context, app: &mut App) {
-    if ctx.text_edit_focused() || egui::Popup::is_any_open(ctx) {
+    // What is written and the Enter that ends it may come in one frame: the letters were not meant for us.
+    let is_writing = ctx.text_edit_focused();
+    let was_writing = std::mem::replace(&mut app.view.is_writing, is_writing);
+    if is_writing || was_writing || egui::Popup::is_any_open(ctx) {
         return;
     }
     let has_focus = ctx.memory(|memory| memory.focused().is_some());
