@@ -161,7 +161,10 @@ test("back in time, on with another β, and the run that was left is kept", asyn
   await press(page, "Home");
   await until(() => status(page).textContent(), (text) => /^paused at update 0 of 732/.test(text));
   await until(() => figure(page, "Ensemble"), (value) => value < -90);
-  for (let i = 0; i < 8; i++) await press(page, "Shift+ArrowRight");
+  for (let update = 50; update <= 400; update += 50) {
+    await press(page, "Shift+ArrowRight");
+    await until(() => status(page).textContent(), (text) => text.startsWith(`paused at update ${update} of 732`));
+  }
   await press(page, "ArrowLeft");
   await until(() => status(page).textContent(), (text) => /^paused at update 399 of 732/.test(text));
   const then = await digest(page);
@@ -314,8 +317,9 @@ test("the palette finds commands, presets, worlds and tabs", async () => {
   const run = async (words) => {
     await press(page, "Control+k");
     await widget(page, "dialog", "Find a command").waitFor(PATIENCE);
-    await page.keyboard.type(words, { delay: 30 });
-    await page.waitForTimeout(150);
+    await until(() => page.evaluate(() => document.activeElement.tagName), (tag) => tag === "INPUT");
+    await page.keyboard.type(words, { delay: 60 });
+    await until(() => widget(page, "textbox", "Find a command").textContent(), (text) => text === words);
     await press(page, "Enter");
     await until(() => page.getByRole("dialog").count(), (count) => count === 0);
   };
@@ -329,7 +333,8 @@ test("the palette finds commands, presets, worlds and tabs", async () => {
   await page.getByRole("heading", { name: "Race", exact: true }).waitFor(PATIENCE);
   await press(page, "Control+k");
   await widget(page, "dialog", "Find a command").waitFor(PATIENCE);
-  await page.keyboard.type("xyzzy", { delay: 30 });
+  await until(() => page.evaluate(() => document.activeElement.tagName), (tag) => tag === "INPUT");
+  await page.keyboard.type("xyzzy", { delay: 60 });
   await says(page, "Nothing is called “xyzzy”.");
   await press(page, "Escape");
   await until(() => page.getByRole("dialog").count(), (count) => count === 0);
