@@ -319,7 +319,7 @@ test("the palette finds commands, presets, worlds and tabs", async () => {
     await widget(page, "dialog", "Find a command").waitFor(PATIENCE);
     await until(() => page.evaluate(() => document.activeElement.tagName), (tag) => tag === "INPUT");
     await page.keyboard.type(words, { delay: 60 });
-    await until(() => widget(page, "textbox", "Find a command").textContent(), (text) => text === words);
+    await until(() => widget(page.locator("#mirror"), "textbox", "Find a command").textContent(), (text) => text === words);
     await press(page, "Enter");
     await until(() => page.getByRole("dialog").count(), (count) => count === 0);
   };
