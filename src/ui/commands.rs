@@ -500,6 +500,10 @@ pub fn show_palette(ctx: &Context, app: &mut App) {
             );
         });
     app.palette.chosen = chosen;
+    if response.should_close() || done.is_some() {
+        // Whatever is pressed next is not written here.
+        ctx.memory_mut(|memory| memory.stop_text_input());
+    }
     if response.should_close() {
         return;
     }
