@@ -459,6 +459,7 @@ pub fn show_palette(ctx: &Context, app: &mut App) {
         }
     });
     let is_entered = ctx.input_mut(|input| input.consume_key(Modifiers::NONE, Key::Enter));
+    let is_left = ctx.input_mut(|input| input.consume_key(Modifiers::NONE, Key::Escape));
     let is_moved = chosen != app.palette.chosen;
     let mut done = found.get(chosen).filter(|_| is_entered).map(|line| line.0);
     let screen = ctx.content_rect().size();
@@ -500,12 +501,13 @@ pub fn show_palette(ctx: &Context, app: &mut App) {
             );
         });
     app.palette.chosen = chosen;
-    if response.should_close() || done.is_some() {
+    let is_left = is_left || response.should_close();
+    if is_left || done.is_some() {
         // Whatever is pressed next is not written here.
         ctx.memory_mut(|memory| memory.stop_text_input());
     }
-    if response.should_close() {
-        return;
+    if is_left {
+        return ctx.request_repaint();
     }
     let Some(deed) = done else {
         app.palette.query = Some(query);
