@@ -30,11 +30,14 @@ pub struct Hands {
     focus: Option<NodeId>,
     /// Whether Tab was the last key, and with Shift, until the focus has moved.
     tab: Option<bool>,
+    /// Whether the last widget has just lost the focus: egui gives it to the first one a frame later, whatever
+    /// else it is told in between.
+    is_between: bool,
 }
 
 impl Hands {
     pub fn new(canvas: HtmlElement, start: HtmlElement, end: HtmlElement) -> Hands {
-        Hands { canvas, start, end, focus: None, tab: None }
+        Hands { canvas, start, end, focus: None, tab: None, is_between: false }
     }
 
     /// Listens to the mirror and to the canvas, for as long as the page lives.
@@ -84,13 +87,17 @@ impl Hands {
     }
 
     /// Gives egui what was done to the mirror.
-    pub fn give(&mut self, input: &mut RawInput) {
+    pub fn give(&mut self, ctx: &Context, input: &mut RawInput) {
         for event in &input.events {
             if let Event::Key { key, pressed: true, modifiers, .. } = event {
                 self.tab = (*key == Key::Tab).then_some(modifiers.shift);
             }
         }
-        input.events.append(&mut WAITING.take());
+        if std::mem::take(&mut self.is_between) {
+            ctx.request_repaint();
+        } else {
+            input.events.append(&mut WAITING.take());
+        }
     }
 
     /// Says where the focus is. `order`: the tree's nodes.
@@ -112,6 +119,7 @@ impl Hands {
         let active = document.active_element();
         let is_at = |end: &HtmlElement| active.as_ref() == Some(end.as_ref());
         if has_gone_round {
+            self.is_between = now.is_none();
             focus(if now < before { &self.end } else { &self.start });
         }
         if has_gone_round || is_at(&self.start) || is_at(&self.end) {

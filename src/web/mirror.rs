@@ -77,10 +77,10 @@ impl Plugin for Mirror {
         });
     }
 
-    fn input_hook(&mut self, _ctx: &Context, input: &mut RawInput) {
+    fn input_hook(&mut self, ctx: &Context, input: &mut RawInput) {
         MIRROR.with_borrow_mut(|mirror| {
             if let Some((_, hands)) = mirror {
-                hands.give(input);
+                hands.give(ctx, input);
             }
         });
     }
