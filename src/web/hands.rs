@@ -93,7 +93,7 @@ impl Hands {
                 self.tab = (*key == Key::Tab).then_some(modifiers.shift);
             }
         }
-        if std::mem::take(&mut self.is_between) {
+        if self.is_between {
             ctx.request_repaint();
         } else {
             input.events.append(&mut WAITING.take());
@@ -102,6 +102,7 @@ impl Hands {
 
     /// Says where the focus is. `order`: the tree's nodes.
     pub fn follow(&mut self, ctx: &Context, update: &TreeUpdate, order: &[NodeId]) {
+        let was_between = std::mem::take(&mut self.is_between);
         let place = |node: NodeId| order.iter().position(|other| *other == node);
         let is_root = update.tree.as_ref().is_some_and(|tree| tree.root == update.focus);
         let focused = (!is_root).then_some(update.focus);
@@ -122,7 +123,7 @@ impl Hands {
             self.is_between = now.is_none();
             focus(if now < before { &self.end } else { &self.start });
         }
-        if has_gone_round || is_at(&self.start) || is_at(&self.end) {
+        if has_gone_round || was_between || is_at(&self.start) || is_at(&self.end) {
             // Nothing on the page has it until it comes back.
             ctx.memory_mut(|memory| memory.stop_text_input());
             ctx.request_repaint();
