@@ -1,16 +1,16 @@
 //! Playing episodes with an ensemble: what an observer gets to see.
 
-use rand::{Rng, RngExt};
+use rand::Rng;
 
-use super::{Config, Ensemble};
-use crate::mdp::{ACTIONS, Draw, Grid, Starts};
+use super::Ensemble;
+use crate::mdp::{ACTIONS, ActionDraw, Grid, Policy, Starts, one_of};
 
 /// Plays an ensemble's episodes on a grid.
 pub struct Demonstrator<'g> {
     grid: &'g Grid,
     starts: Starts<'g>,
-    draws: Vec<Draw<ACTIONS>>,
-    experts: u32,
+    draws: Vec<ActionDraw>,
+    experts: usize,
     horizon: usize,
 }
 
@@ -28,16 +28,17 @@ impl<'g> Demonstrator<'g> {
         Demonstrator {
             grid,
             starts: Starts::new(grid),
-            draws: action_draws(ensemble),
-            experts: ensemble.experts() as u32,
+            draws: ensemble.policies().iter().flat_map(Policy::rows).map(|row| ActionDraw::new(row)).collect(),
+            experts: ensemble.experts(),
             horizon: horizon as usize,
         }
     }
 
     /// Plays one episode and returns its context: an expert is drawn and acts for all of it.
     pub fn play(&self, episode: &mut Episode, rng: &mut impl Rng) -> usize {
-        let context = rng.random_range(0..self.experts) as usize;
-        let mut state = self.starts.start(rng);
+        let bits = rng.next_u64();
+        let context = one_of(self.experts, (bits >> 32) as u32);
+        let mut state = self.starts.start(bits as u32);
         episode.states.clear();
         episode.entries.clear();
         while state != self.grid.goal() && episode.entries.len() < self.horizon {
@@ -50,11 +51,3 @@ impl<'g> Demonstrator<'g> {
         context
     }
 }
-
-/// For each (context, state), the draw of its action.
-pub fn action_draws(ensemble: &Ensemble) -> Vec<Draw<ACTIONS>> {
-    ensemble.policies().iter().flat_map(|policy| policy.rows().iter().map(|row| Draw::new(row))).collect()
-}
-
-/// The draw of a context at a state.
-pub type ContextDraw = Draw<{ Config::MAX_EXPERTS as usize }>;

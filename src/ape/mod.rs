@@ -4,6 +4,7 @@
 
 mod adam;
 mod algorithm;
+mod batch;
 mod choice;
 mod config;
 mod demonstrate;

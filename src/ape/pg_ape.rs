@@ -5,56 +5,60 @@
 //! J(θ) = E_{τ ~ π_c}[r(τ)] − β E_{τ ~ π_o}[r(τ)]                                   (paper, Eq. 3)
 //!
 //! once with Adam. Experts are tables of logits, `θ[c][s][a]`. As they are tables, the gradient needs nothing
-//! of a batch but how often each (context, state, action) was taken and the sum of the returns that followed:
-//! [`Tally`] is all that playing writes.
+//! of a batch but how often each (context, state, action) was taken and the sum of the returns that followed: a
+//! [`Tally`].
 
-use rand::{Rng, SeedableRng};
+use rand::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::adam::Adam;
 use super::algorithm::{Algorithm, Experts};
-use super::demonstrate::{ContextDraw, Demonstrator, Episode, action_draws};
+use super::batch::{Batch, ClonePlayer, Course, EnsemblePlayer, WALKERS};
 use super::observer::{Memory, Observer};
-use super::{BaselineKind, Config, Contexts, Ensemble, GradientKind, ReturnToGo};
-use crate::mdp::{ACTIONS, Grid, Starts};
+use super::{AdversaryReward, BaselineKind, Config, Contexts, Ensemble, GradientKind, ReturnToGo};
+use crate::mdp::{ACTIONS, ActionDraw, Draw, Grid, Policy};
 
-/// A batch of episodes as far as learning needs it, per (context, state, action).
+/// A batch of episodes as far as learning needs it.
 #[derive(Clone)]
 struct Tally {
-    /// `[n][S][5]`: how often the action was taken.
-    count: Vec<u32>,
-    /// `[n][S][5]`: sum of the returns R(t) that followed.
-    returns: Vec<f64>,
-    episodes: u32,
-    steps: u32,
+    /// `[n][S][5]`: how often each action was taken, and the sum of the returns R(t) that followed.
+    entries: Vec<[f64; 2]>,
+    episodes: f64,
+    steps: f64,
 }
 
 impl Tally {
     fn new(entries: usize) -> Tally {
-        Tally { count: vec![0; entries], returns: vec![0.0; entries], episodes: 0, steps: 0 }
+        Tally { entries: vec![[0.0; 2]; entries], episodes: 0.0, steps: 0.0 }
     }
 
-    fn clear(&mut self) {
-        self.count.fill(0);
-        self.returns.fill(0.0);
-        (self.episodes, self.steps) = (0, 0);
-    }
-
-    /// Adds an episode's steps with the returns that followed them: `to_go(t)`, times a weight.
-    fn add_episode(&mut self, entries: &[u32], to_go: impl Fn(usize) -> f64, weights: &[f64]) {
-        for (t, (&entry, weight)) in entries.iter().zip(weights).enumerate() {
-            self.count[entry as usize] += 1;
-            self.returns[entry as usize] += weight * to_go(t);
-        }
-        self.episodes += 1;
-        self.steps += entries.len() as u32;
+    /// Counts a batch. `reward`: of an entry; `weights`: what the return after step t counts, `[T]`, where that is
+    /// not 1.
+    #[inline(always)]
+    fn count(&mut self, batch: &Batch, discount: f64, reward: impl Fn(usize) -> f64, weights: Option<&[f64]>) {
+        self.entries.fill([0.0; 2]);
+        let mut episodes = 0;
+        // The return that follows each walker's step before this one; 0 after an episode's end.
+        let mut later = [0.0; WALKERS];
+        batch.backwards(|walker, step| {
+            let later = &mut later[walker];
+            let to_go = reward(step.entry()) + discount * *later;
+            let entry = &mut self.entries[step.entry()];
+            entry[0] += 1.0;
+            entry[1] += weights.map_or(to_go, |weights| weights[step.time()] * to_go);
+            let is_first = step.time() == 0;
+            episodes += u32::from(is_first);
+            // Without a branch, which would often be mistaken.
+            *later = f64::from_bits(to_go.to_bits() & u64::from(is_first).wrapping_sub(1));
+        });
+        self.episodes = f64::from(episodes);
+        self.steps = batch.steps() as f64;
     }
 
     /// Visits and returns of the pair (context, state) with this number, over its actions.
     fn pair(&self, pair: usize) -> (f64, f64) {
-        let actions = pair * ACTIONS..(pair + 1) * ACTIONS;
-        let count: u32 = self.count[actions.clone()].iter().sum();
-        (f64::from(count), self.returns[actions].iter().sum())
+        let actions = &self.entries[pair * ACTIONS..][..ACTIONS];
+        actions.iter().fold((0.0, 0.0), |sum, entry| (sum.0 + entry[0], sum.1 + entry[1]))
     }
 }
 
@@ -76,15 +80,16 @@ pub struct PgApe {
     /// φ. `joint`: Ṽ_c, `[n][S]`. `separate`: V_c, `[n][S]`, then V_o, `[S]`.
     values: Vec<f64>,
     values_adam: Adam,
-    /// Return that follows a step when k steps are left, counted from that step: `[T + 1]`.
-    to_go: Vec<f64>,
-    /// What the return after step t counts: γᵗ for `from_start`, 1 for `from_step`: `[T]`.
-    weights: Vec<f64>,
-    /// r̃(s, a), `[S][5]`, where the clone's reward is not the experts'.
-    adversary_reward: Option<Vec<[f64; ACTIONS]>>,
+    /// What the return after step t counts for `from_start`, γᵗ: `[T]`. For `from_step` all count the same.
+    weights: Option<Vec<f64>>,
+    /// r̃ by entry, `[n][S][5]`, where the clone's reward is not the experts'.
+    adversary_reward: Option<Vec<f64>>,
+    course: Course,
+    /// What is played in; made anew in every update.
+    batch: Batch,
+    actions: Vec<ActionDraw>,
     ensemble_tally: Tally,
     clone_tally: Tally,
-    episode: Episode,
 }
 
 impl PgApe {
@@ -96,27 +101,21 @@ impl PgApe {
             BaselineKind::Joint => pairs,
             BaselineKind::Separate => pairs + cells,
         };
-        let (mut to_go, mut weights) = (vec![0.0], Vec::new());
-        let mut weight = 1.0;
-        for step in 0..horizon {
-            // The reward is −1 a step, so that a return depends only on how many steps are left.
-            to_go.push(-1.0 + config.discount * to_go[step]);
-            weights.push(weight);
-            if config.return_to_go == ReturnToGo::FromStart {
-                weight *= config.discount;
-            }
-        }
+        let weight = |step| libm::pow(config.discount, step as f64);
+        let weights = (config.return_to_go == ReturnToGo::FromStart).then(|| (0..horizon).map(weight).collect());
+        let by_entry = |reward: &AdversaryReward| reward.table(&grid).as_flattened().repeat(experts);
         PgApe {
             rng: Xoshiro256PlusPlus::seed_from_u64(u64::from(config.seed)),
             observer: config.observer.build(&grid, experts),
             values: vec![0.0; values],
             values_adam: Adam::new(values),
-            to_go,
             weights,
+            adversary_reward: config.adversary_reward.as_ref().map(by_entry),
+            course: Course::new(&grid, config.horizon),
+            batch: Batch::default(),
+            actions: Vec::new(),
             ensemble_tally: Tally::new(pairs * ACTIONS),
             clone_tally: Tally::new(pairs * ACTIONS),
-            episode: Episode::default(),
-            adversary_reward: config.adversary_reward.as_ref().map(|reward| reward.table(&grid)),
             experts: Experts::new(grid, config, vec![0.0; pairs * ACTIONS]),
         }
     }
@@ -133,64 +132,72 @@ impl PgApe {
 
     /// Plays τ₁: an expert is drawn for an episode and acts for all of it.
     fn play_ensemble(&mut self, ensemble: &Ensemble) {
-        self.ensemble_tally.clear();
-        let demonstrator = Demonstrator::new(&self.experts.grid, ensemble, self.experts.config.horizon);
-        while self.ensemble_tally.steps < self.experts.config.batch_steps {
-            let context = demonstrator.play(&mut self.episode, &mut self.rng);
-            let steps = self.episode.entries.len();
-            self.ensemble_tally.add_episode(&self.episode.entries, |t| self.to_go[steps - t], &self.weights);
-            self.observer.saw(context, &self.episode.states);
+        let Config { batch_steps, discount, observer, .. } = self.experts.config;
+        let cells = self.experts.grid.cells();
+        self.actions.clear();
+        self.actions.extend(ensemble.policies().iter().flat_map(Policy::rows).map(|row| ActionDraw::new(row)));
+        let player = EnsemblePlayer { actions: &self.actions, cells };
+        self.batch.play(&self.course, &player, batch_steps, &mut self.rng);
+        count(&mut self.ensemble_tally, &self.batch, discount, None, self.weights.as_deref());
+        if observer.model().learns {
+            self.show();
+        }
+    }
+
+    /// Shows the observer the episodes of the batch.
+    fn show(&mut self) {
+        let cells = self.experts.grid.cells();
+        let (mut context, mut states) = (0, Vec::new());
+        for walk in self.batch.walks() {
+            for step in walk {
+                if step.time() == 0 && !states.is_empty() {
+                    self.observer.saw(context, &states);
+                    states.clear();
+                }
+                let pair = step.entry() / ACTIONS;
+                context = pair / cells;
+                states.push((pair % cells) as u32);
+            }
+            if !states.is_empty() {
+                self.observer.saw(context, &states);
+                states.clear();
+            }
         }
     }
 
     /// Plays τ₂: the context is drawn anew at each state, then the action from that expert.
     fn play_clone(&mut self, ensemble: &Ensemble, contexts: &Contexts) {
-        let draws = action_draws(ensemble);
-        let cells = self.experts.grid.cells();
-        let context_draws: Vec<ContextDraw> = (0..cells).map(|state| ContextDraw::new(contexts.row(state))).collect();
-        let memory = self.observer.memory(ensemble);
+        match (self.observer.memory(ensemble), ensemble.experts()) {
+            (Some(memory), _) => self.play_remembering(ensemble.experts(), &*memory),
+            (None, ..=2) => self.play_blind::<1>(contexts),
+            (None, ..=4) => self.play_blind::<3>(contexts),
+            (None, _) => self.play_blind::<{ Config::MAX_EXPERTS as usize - 1 }>(contexts),
+        }
+        let Config { discount, .. } = self.experts.config;
+        count(&mut self.clone_tally, &self.batch, discount, self.adversary_reward.as_deref(), self.weights.as_deref());
+    }
+
+    fn play_blind<const ENDS: usize>(&mut self, contexts: &Contexts) {
+        let draw = |state| Draw::new(contexts.row(state));
+        let contexts: Vec<Draw<ENDS>> = (0..self.experts.grid.cells()).map(draw).collect();
+        let player = ClonePlayer { actions: &self.actions, contexts: &contexts };
+        self.batch.play(&self.course, &player, self.experts.config.batch_steps, &mut self.rng);
+    }
+
+    fn play_remembering(&mut self, experts: usize, memory: &dyn Memory) {
+        let (actions, cells) = (&self.actions, self.experts.grid.cells());
         let mut remembered = Vec::new();
-        let mut p = vec![0.0; ensemble.experts()];
-        self.clone_tally.clear();
-        let starts = Starts::new(&self.experts.grid);
-        while self.clone_tally.steps < self.experts.config.batch_steps {
-            let mut state = starts.start(&mut self.rng);
-            self.episode.entries.clear();
-            if let Some(memory) = &memory {
+        let mut p = vec![0.0; experts];
+        self.batch.play_one(&self.course, self.experts.config.batch_steps, &mut self.rng, |state, time, bits| {
+            if time == 0 {
                 remembered = memory.start();
             }
-            while state != self.experts.grid.goal() && self.episode.entries.len() < self.experts.config.horizon as usize
-            {
-                // One draw of 64 bits: half for the context, half for the action.
-                let bits = self.rng.next_u64();
-                let context = match &memory {
-                    None => context_draws[state].outcome((bits >> 32) as u32),
-                    Some(memory) => {
-                        memory.see(&mut remembered, state, &mut p);
-                        ContextDraw::new(&p).outcome((bits >> 32) as u32)
-                    }
-                };
-                let pair = context * cells + state;
-                let action = draws[pair].outcome(bits as u32);
-                if let Some(memory) = &memory {
-                    memory.act(&mut remembered, state, action);
-                }
-                self.episode.entries.push((pair * ACTIONS + action) as u32);
-                state = starts.step(state, action, &mut self.rng);
-            }
-            let entries = &self.episode.entries;
-            match &self.adversary_reward {
-                None => self.clone_tally.add_episode(entries, |t| self.to_go[entries.len() - t], &self.weights),
-                Some(reward) => {
-                    let mut to_go = vec![0.0; entries.len() + 1];
-                    for (t, &entry) in entries.iter().enumerate().rev() {
-                        let (pair, action) = (entry as usize / ACTIONS, entry as usize % ACTIONS);
-                        to_go[t] = reward[pair % cells][action] + self.experts.config.discount * to_go[t + 1];
-                    }
-                    self.clone_tally.add_episode(entries, |t| to_go[t], &self.weights);
-                }
-            }
-        }
+            memory.see(&mut remembered, state, &mut p);
+            let context = Draw::<{ Config::MAX_EXPERTS as usize - 1 }>::new(&p).outcome((bits >> 32) as u32);
+            let action = actions[context * cells + state].outcome(bits as u32);
+            memory.act(&mut remembered, state, action);
+            (context, action)
+        });
     }
 
     /// G₁ + G₂ (paper, Eqs. 5–7).
@@ -210,16 +217,16 @@ impl PgApe {
         let advantages = |tally: &Tally, pair: usize, scale: f64, baseline: f64| -> [f64; ACTIONS] {
             std::array::from_fn(|action| {
                 let entry = pair * ACTIONS + action;
-                scale * tally.returns[entry] - baseline * f64::from(tally.count[entry])
+                scale * tally.entries[entry][1] - baseline * tally.entries[entry][0]
             })
         };
         // G₁ = 1/N₁ Σ ∇ log π_c(a|s) Ã(t), Ã(t) = R(t) − Ṽ_c(s).
-        let per_episode = 1.0 / f64::from(self.ensemble_tally.episodes);
+        let per_episode = 1.0 / self.ensemble_tally.episodes;
         for pair in 0..pairs {
             add(pair, advantages(&self.ensemble_tally, pair, 1.0, self.values[pair]).map(|a| a * per_episode));
         }
         // G₂ = 1/N₂ Σ ∇ log π_o(a|s) Ã(t), Ã(t) = −βR(t) − Ṽ_o(s).
-        let per_episode = 1.0 / f64::from(self.clone_tally.episodes);
+        let per_episode = 1.0 / self.clone_tally.episodes;
         match self.experts.config.gradient {
             GradientKind::SampledContext => {
                 for pair in 0..pairs {
@@ -276,7 +283,7 @@ impl PgApe {
             let mut fit = |tally: &Tally, index: usize, scale: f64| {
                 let (count, returns) = tally.pair(pair);
                 let error = scale * returns - count * self.values[index];
-                gradient[index] += value_weight * error / f64::from(tally.episodes);
+                gradient[index] += value_weight * error / tally.episodes;
             };
             fit(&self.ensemble_tally, pair, 1.0);
             match baseline {
@@ -286,6 +293,16 @@ impl PgApe {
             }
         }
         gradient
+    }
+}
+
+/// Counts a batch, of the experts' own reward or of another, each by a loop of its own.
+fn count(tally: &mut Tally, batch: &Batch, discount: f64, reward: Option<&[f64]>, weights: Option<&[f64]>) {
+    match (reward, weights) {
+        (None, None) => tally.count(batch, discount, |_| -1.0, None),
+        (None, weights) => tally.count(batch, discount, |_| -1.0, weights),
+        (Some(reward), None) => tally.count(batch, discount, |entry| reward[entry], None),
+        (Some(reward), weights) => tally.count(batch, discount, |entry| reward[entry], weights),
     }
 }
 
@@ -314,7 +331,7 @@ impl Algorithm for PgApe {
     fn bytes(&self) -> usize {
         // Numbers with two moments of Adam each, and two tallies.
         3 * 8 * (self.experts.logits.len() + self.values.len())
-            + 2 * 12 * self.experts.logits.len()
+            + 2 * 16 * self.experts.logits.len()
             + self.observer.bytes()
     }
 
@@ -333,11 +350,11 @@ impl Algorithm for PgApe {
         // 4: gradient update on the experts, θ ← θ + α_θ ∇J(θ).
         let gradient = self.policy_gradient(&ensemble, &contexts);
         let value_gradient = self.value_gradient();
-        let share = |tally: &Tally, pair| tally.pair(pair).0 / f64::from(tally.steps);
+        let share = |tally: &Tally, pair| tally.pair(pair).0 / tally.steps;
         let visited = |pair| share(&self.ensemble_tally, pair) + share(&self.clone_tally, pair);
         self.experts.ascend(gradient, self.experts.config.entropy_weight(self.experts.updates), visited);
         // 5: update of the value function, φ ← φ − α_φ ∇J(φ).
         self.values_adam.ascend(&mut self.values, &value_gradient, self.experts.config.learning_rate);
-        -f64::from(self.ensemble_tally.steps) / f64::from(self.ensemble_tally.episodes)
+        -self.ensemble_tally.steps / self.ensemble_tally.episodes
     }
 }

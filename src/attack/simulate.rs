@@ -5,7 +5,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::{Progress, Target};
 use crate::ape::observer::Memory;
-use crate::mdp::{ACTIONS, Draw, KnownReturns, Starts};
+use crate::mdp::{ACTIONS, ActionDraw, KnownReturns, Starts};
 
 /// Episodes that a clone is tried in as a rule.
 pub const TRIALS: usize = 10_000;
@@ -46,7 +46,7 @@ pub fn simulate(
                         *row += p * pi;
                     }
                 }
-                let action = Draw::<ACTIONS>::new(&row).outcome(rng.next_u32());
+                let action = ActionDraw::new(&row).outcome(rng.next_u32());
                 memory.act(&mut remembered, state, action);
                 state = starts.step(state, action, &mut rng);
                 t += 1;

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use crate::ape::observer::{Memory, Posterior};
 use crate::ape::{Ensemble, EnsembleError, EnsembleFile};
 use crate::attack::{AttackerChoice, Progress, Target};
-use crate::mdp::{ACTIONS, Arrivals, Cell, Draw, Grid, Policy, optimal_policy};
+use crate::mdp::{ACTIONS, ActionDraw, Arrivals, Cell, Draw, Grid, Policy, one_of, optimal_policy};
 
 /// Who races; a racer's place in [`Raced::runs`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -123,14 +123,14 @@ impl Raced {
 /// How a racer chooses.
 enum Mind {
     /// By the cell alone.
-    Policy(Vec<Draw<ACTIONS>>),
+    Policy(Vec<ActionDraw>),
     /// By the mixture of the experts that its memory of the episode says.
     Memory(Box<dyn Memory>),
 }
 
 impl Mind {
     fn of(policy: &Policy) -> Mind {
-        Mind::Policy(policy.rows().iter().map(|row| Draw::new(row)).collect())
+        Mind::Policy(policy.rows().iter().map(|row| ActionDraw::new(row)).collect())
     }
 }
 
@@ -157,18 +157,13 @@ impl Luck {
     }
 }
 
-/// One of `n` equally likely outcomes, by 32 uniform bits.
-fn one_of(n: usize, bits: u32) -> usize {
-    ((n as u64 * u64::from(bits)) >> 32) as usize
-}
-
 /// What all racers run on.
 struct Track<'a> {
     grid: &'a Grid,
     ensemble: &'a Ensemble,
     start: usize,
     horizon: u32,
-    slip: Draw<2>,
+    slip: Draw<1>,
 }
 
 impl<'a> Track<'a> {
@@ -195,7 +190,7 @@ impl<'a> Track<'a> {
                     for (policy, p) in self.ensemble.policies().iter().zip(&p) {
                         row.iter_mut().zip(policy.row(state)).for_each(|(row, pi)| *row += p * pi);
                     }
-                    let action = Draw::<ACTIONS>::new(&row).outcome(action);
+                    let action = ActionDraw::new(&row).outcome(action);
                     mind.act(&mut memory, state, action);
                     action
                 }

@@ -16,7 +16,7 @@ pub use model::{Transition, TransitionModel, transition_model};
 pub use optimal::optimal_policy;
 pub use policy::{Policy, PolicyError};
 pub use returns::{CAP, HORIZON, KnownReturns, Occupancy, RETURN_KINDS, ReturnKind, Returns, Solver, Value, occupancy};
-pub use rollout::{Draw, Starts};
+pub use rollout::{ActionDraw, Draw, Starts, one_of};
 
 /// Number of actions.
 pub const ACTIONS: usize = 5;
