@@ -21,13 +21,15 @@ impl Adam {
     pub fn ascend(&mut self, parameters: &mut [f64], gradient: &[f64], learning_rate: f64) {
         let (b1, b2) = Self::BETA;
         self.decayed = (self.decayed.0 * b1, self.decayed.1 * b2);
-        let (c1, c2) = (1.0 - self.decayed.0, 1.0 - self.decayed.1);
+        // The corrections once for all parameters: m/c₁ / (√(v/c₂) + ε) = m/c₁ / (√v/√c₂ + ε).
+        let step = learning_rate / (1.0 - self.decayed.0);
+        let scale = 1.0 / (1.0 - self.decayed.1).sqrt();
         for ((parameter, g), (m, v)) in
             parameters.iter_mut().zip(gradient).zip(self.first.iter_mut().zip(&mut self.second))
         {
             *m = b1 * *m + (1.0 - b1) * g;
-            *v = b2 * *v + (1.0 - b2) * g * g;
-            *parameter += learning_rate * (*m / c1) / ((*v / c2).sqrt() + Self::EPSILON);
+            *v = b2 * *v + (1.0 - b2) * (g * g);
+            *parameter += step * *m / (v.sqrt() * scale + Self::EPSILON);
         }
     }
 }

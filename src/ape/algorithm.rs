@@ -6,6 +6,7 @@ use super::adam::Adam;
 use super::exact_ape::ExactApe;
 use super::observer::Memory;
 use super::pg_ape::PgApe;
+use super::softmax::softmax;
 use super::{AlgorithmKind, Config, ConfigError, Contexts, Ensemble};
 use crate::mdp::{ACTIONS, Grid, Policy};
 
@@ -33,9 +34,18 @@ impl Experts {
     }
 
     /// θ ← θ + α_θ ∇J(θ), with the bonus on the entropy of the policies where they went: `visited` is the share of
-    /// visits to the pair (context, state) of this number, `weight` that of the bonus.
-    pub fn ascend(&mut self, mut gradient: Vec<f64>, weight: f64, visited: impl Fn(usize) -> f64) {
-        add_entropy_bonus(&self.ensemble(), weight, visited, &mut gradient);
+    /// visits to the pair (context, state) of this number, `weight` that of the bonus. `ensemble`: the experts as
+    /// they are now.
+    pub fn ascend(
+        &mut self,
+        ensemble: &Ensemble,
+        mut gradient: Vec<f64>,
+        weight: f64,
+        visited: impl Fn(usize) -> f64,
+    ) {
+        if weight > 0.0 {
+            add_entropy_bonus(&self.logits, ensemble, weight, visited, &mut gradient);
+        }
         self.adam.ascend(&mut self.logits, &gradient, self.config.learning_rate);
         self.updates += 1;
     }
@@ -189,35 +199,29 @@ fn dual_ascent(beta: f64, ensemble_return: f64, alpha: f64) -> f64 {
     (beta * libm::exp(step)).clamp(LEAST, Config::MAX_BETA)
 }
 
-/// The experts of a table of logits, `[n][S][5]`: π(a) = exp θ_a / Σ exp θ, the same bits on every machine.
-pub fn softmax(logits: &[f64], cells: usize) -> Ensemble {
-    let row = |logits: &[f64; ACTIONS]| {
-        let top = logits.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        let weights = logits.map(|logit| libm::exp(logit - top));
-        let sum: f64 = weights.iter().sum();
-        weights.map(|weight| weight / sum)
-    };
-    let rows: Vec<[f64; ACTIONS]> = logits.as_chunks().0.iter().map(row).collect();
-    Ensemble::new(rows.chunks(cells).map(|rows| Policy::from_rows(rows.to_vec())).collect())
-}
-
 /// Adds `weight` times the gradient of the mean entropy of the policies where they went: `visited` is the share
 /// of visits to the pair (context, state) of this number.
-fn add_entropy_bonus(ensemble: &Ensemble, weight: f64, visited: impl Fn(usize) -> f64, gradient: &mut [f64]) {
-    if weight == 0.0 {
-        return;
-    }
-    let cells = ensemble.policies()[0].rows().len();
-    for (pair, gradient) in gradient.as_chunks_mut::<ACTIONS>().0.iter_mut().enumerate() {
-        let visited = visited(pair);
-        if visited == 0.0 {
+fn add_entropy_bonus(
+    logits: &[f64],
+    ensemble: &Ensemble,
+    weight: f64,
+    visited: impl Fn(usize) -> f64,
+    gradient: &mut [f64],
+) {
+    let experts = ensemble.policies().iter().flat_map(Policy::rows);
+    let rows = logits.as_chunks::<ACTIONS>().0.iter().zip(gradient.as_chunks_mut::<ACTIONS>().0).enumerate();
+    for (pi, (pair, (logits, gradient))) in experts.zip(rows) {
+        let weight = weight * visited(pair);
+        if weight == 0.0 {
             continue;
         }
-        let pi = ensemble.policies()[pair / cells].row(pair % cells);
-        let log = pi.map(|p| if p > 0.0 { libm::log(p) } else { 0.0 });
+        // One logarithm for five: log π(a) = θ_a − max θ + log max π.
+        let top = |row: &[f64; ACTIONS]| row.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let shift = libm::log(top(pi)) - top(logits);
+        let log = logits.map(|logit| logit + shift);
         let entropy: f64 = -pi.iter().zip(&log).map(|(p, log)| p * log).sum::<f64>();
         for b in 0..ACTIONS {
-            gradient[b] -= weight * visited * pi[b] * (log[b] + entropy);
+            gradient[b] -= weight * pi[b] * (log[b] + entropy);
         }
     }
 }

@@ -4,7 +4,8 @@
 //! waits the others go on, so that four take little longer than one. How many there are follows from the
 //! configuration, never from the machine.
 
-use rand::Rng;
+use rand::{Rng, SeedableRng};
+use rand_xoshiro::Xoshiro256PlusPlus;
 
 use crate::mdp::{ACTIONS, ActionDraw, Draw, Grid, one_of};
 
@@ -17,85 +18,115 @@ pub const WALKERS: usize = 4;
 pub struct Step(u32);
 
 impl Step {
-    const BITS: u32 = 16;
+    const ENTRY: u32 = 0xffff;
+    /// One step of time.
+    const TICK: u32 = Self::ENTRY + 1;
 
     pub fn entry(self) -> usize {
-        (self.0 & 0xffff) as usize
+        (self.0 & Self::ENTRY) as usize
     }
 
     /// Steps of its episode before it.
     pub fn time(self) -> usize {
-        (self.0 >> Self::BITS) as usize
+        (self.0 / Self::TICK) as usize
     }
 }
 
-/// Where episodes are played, laid out for speed.
+/// Where episodes are played, laid out for speed: as many copies of the grid as one plays on, each a context of its
+/// own. A place is `copy · S + state`.
 #[derive(Clone)]
 pub struct Course {
-    /// `[S][8]`: where each executed action leads, padded.
+    /// `[copies][S][8]`: the place that each executed action leads to, padded; [`Course::GOAL`] for the goal.
     next: Vec<[u16; 8]>,
     starts: Vec<u32>,
-    goal: usize,
-    slip: Option<Draw<1>>,
-    horizon: u32,
+    cells: usize,
+    slip: Draw<1>,
+    is_slippery: bool,
+    /// Where a walker's clock is when its time is over.
+    end: u32,
 }
 
 impl Course {
+    const GOAL: u16 = u16::MAX;
+
     /// Episodes of at most `horizon` steps, below 2¹⁶.
-    pub fn new(grid: &Grid, horizon: u32) -> Course {
-        let next = |cell| std::array::from_fn(|action| grid.next(cell)[action.min(ACTIONS - 1)] as u16);
+    pub fn new(grid: &Grid, horizon: u32, copies: usize) -> Course {
+        let cells = grid.cells();
+        let next = |place: usize| {
+            let to = grid.next(place % cells).map(|state| state as usize);
+            let to = to.map(|state| if state == grid.goal() { Self::GOAL } else { (place - place % cells + state) as u16 });
+            std::array::from_fn(|action| to[action.min(ACTIONS - 1)])
+        };
         Course {
-            next: (0..grid.cells()).map(next).collect(),
+            next: (0..copies * cells).map(next).collect(),
             starts: grid.starts().to_vec(),
-            goal: grid.goal(),
-            slip: (grid.slip() > 0.0).then(|| Draw::new(&[1.0 - grid.slip(), grid.slip()])),
-            horizon,
+            cells,
+            slip: Draw::new(&[1.0 - grid.slip(), grid.slip()]),
+            is_slippery: grid.slip() > 0.0,
+            end: horizon * Step::TICK,
         }
     }
 
+    /// Where an episode begins: any copy, any start. Not often, so it is kept out of the way.
+    #[cold]
+    #[inline(never)]
+    fn start(&self, rng: &mut impl Rng) -> usize {
+        let bits = rng.next_u64();
+        let copy = one_of(self.next.len() / self.cells, (bits >> 32) as u32);
+        copy * self.cells + self.starts[one_of(self.starts.len(), bits as u32)] as usize
+    }
+
+    /// Where choosing `action` leads, on a grid that slips or not.
     #[inline(always)]
-    fn lead(&self, state: usize, action: usize, rng: &mut impl Rng) -> usize {
+    fn lead<const SLIPS: bool>(&self, place: usize, action: usize, rng: &mut impl Rng) -> u16 {
         let mut executed = action;
-        if let Some(slip) = &self.slip {
+        if SLIPS {
             let bits = rng.next_u64();
             let other = one_of(ACTIONS, bits as u32);
-            executed = if slip.outcome((bits >> 32) as u32) == 1 { other } else { action };
+            executed = if self.slip.outcome((bits >> 32) as u32) == 1 { other } else { action };
         }
-        usize::from(self.next[state][executed])
+        self.next[place][executed]
     }
 }
 
-/// Who chooses the actions, without a memory of more than its expert.
-pub trait Player {
-    /// Whether a step takes 64 random bits, not 32.
-    const IS_WIDE: bool;
-
-    /// What is drawn for an episode.
-    fn begin(&self, bits: u32) -> usize;
-
-    /// The pair (context, state), `c · S + s`, and the action; `drawn` is what the episode began with.
-    fn act(&self, drawn: usize, state: usize, bits: u64) -> (usize, usize);
+/// Where chance comes from: one generator for what happens at steps, one for where episodes start.
+#[derive(Clone)]
+pub struct Luck<R> {
+    steps: R,
+    starts: R,
 }
 
-/// The ensemble: an expert is drawn for an episode and acts for all of it.
+impl Luck<Xoshiro256PlusPlus> {
+    pub fn new(seed: u32) -> Self {
+        let steps = Xoshiro256PlusPlus::seed_from_u64(u64::from(seed));
+        let mut starts = steps.clone();
+        // 2¹²⁸ draws ahead.
+        starts.jump();
+        Luck { steps, starts }
+    }
+}
+
+/// Who chooses the actions.
+pub trait Player {
+    /// Whether a choice takes 64 random bits, not 32.
+    const IS_WIDE: bool;
+
+    /// The pair (context, state), `c · S + s`, and the action.
+    fn act(&self, place: usize, bits: u64) -> (usize, usize);
+}
+
+/// The ensemble, each expert on its own copy of the grid.
 pub struct EnsemblePlayer<'a> {
     /// `[n][S]`.
     pub actions: &'a [ActionDraw],
-    pub cells: usize,
 }
 
 impl Player for EnsemblePlayer<'_> {
     const IS_WIDE: bool = false;
 
     #[inline(always)]
-    fn begin(&self, bits: u32) -> usize {
-        one_of(self.actions.len() / self.cells, bits) * self.cells
-    }
-
-    #[inline(always)]
-    fn act(&self, drawn: usize, state: usize, bits: u64) -> (usize, usize) {
-        let pair = drawn + state;
-        (pair, self.actions[pair].outcome(bits as u32))
+    fn act(&self, place: usize, bits: u64) -> (usize, usize) {
+        (place, self.actions[place].outcome(bits as u32))
     }
 }
 
@@ -112,54 +143,74 @@ impl<const ENDS: usize> Player for ClonePlayer<'_, ENDS> {
     const IS_WIDE: bool = true;
 
     #[inline(always)]
-    fn begin(&self, _bits: u32) -> usize {
-        0
-    }
-
-    #[inline(always)]
-    fn act(&self, _drawn: usize, state: usize, bits: u64) -> (usize, usize) {
-        let pair = self.contexts[state].outcome((bits >> 32) as u32) * self.contexts.len() + state;
+    fn act(&self, place: usize, bits: u64) -> (usize, usize) {
+        let pair = self.contexts[place].outcome((bits >> 32) as u32) * self.contexts.len() + place;
         (pair, self.actions[pair].outcome(bits as u32))
+    }
+}
+
+/// A choice that was made already.
+struct Chosen {
+    pair: usize,
+    action: usize,
+}
+
+impl Player for Chosen {
+    const IS_WIDE: bool = true;
+
+    fn act(&self, _place: usize, _bits: u64) -> (usize, usize) {
+        (self.pair, self.action)
     }
 }
 
 /// A walker under way.
 #[derive(Clone, Copy, Default)]
 struct Walker {
-    state: usize,
-    drawn: usize,
-    time: u32,
+    place: usize,
+    /// Steps of its episode so far, in ticks.
+    clock: u32,
 }
 
 impl Walker {
-    #[inline(always)]
-    fn begin(course: &Course, player: &impl Player, rng: &mut impl Rng) -> Walker {
-        let bits = rng.next_u64();
-        let state = course.starts[one_of(course.starts.len(), bits as u32)] as usize;
-        Walker { state, drawn: player.begin((bits >> 32) as u32), time: 0 }
+    fn begin(course: &Course, luck: &mut Luck<impl Rng>) -> Walker {
+        Walker { place: course.start(&mut luck.starts), clock: 0 }
     }
 
     /// One step; after an episode's last, a new one begins.
     #[inline(always)]
-    fn step(&mut self, course: &Course, player: &impl Player, bits: u64, rng: &mut impl Rng) -> Step {
-        let (pair, action) = player.act(self.drawn, self.state, bits);
-        let step = Step((pair * ACTIONS + action) as u32 | self.time << Step::BITS);
-        self.state = course.lead(self.state, action, rng);
-        self.time += 1;
-        if self.state == course.goal || self.time == course.horizon {
-            *self = Walker::begin(course, player, rng);
+    fn step<const SLIPS: bool>(
+        &mut self,
+        course: &Course,
+        player: &impl Player,
+        bits: u64,
+        steps: &mut impl Rng,
+        starts: &mut impl Rng,
+    ) -> Step {
+        let (pair, action) = player.act(self.place, bits);
+        let step = Step((pair * ACTIONS + action) as u32 + self.clock);
+        let next = course.lead::<SLIPS>(self.place, action, steps);
+        self.place = usize::from(next);
+        self.clock += Step::TICK;
+        if (next == Course::GOAL) | (self.clock == course.end) {
+            *self = Walker { place: course.start(starts), clock: 0 };
         }
         step
     }
 }
 
-/// Whole episodes, in the order in which each walker went through them.
-#[derive(Clone, Default)]
+/// Whole episodes, in the order in which each walker went through them. A copy is empty: what was played is of no more use.
+#[derive(Default)]
 pub struct Batch {
     /// A row for each moment at which all walkers took a step.
     rows: Vec<[Step; WALKERS]>,
     /// What each walker still had to go then.
     tails: [Vec<Step>; WALKERS],
+}
+
+impl Clone for Batch {
+    fn clone(&self) -> Self {
+        Batch::default()
+    }
 }
 
 impl Batch {
@@ -168,28 +219,54 @@ impl Batch {
         WALKERS * self.rows.len() + self.tails.iter().map(Vec::len).sum::<usize>()
     }
 
+    /// Episodes played.
+    pub fn episodes(&self) -> u32 {
+        let begun = |steps: &[Step]| steps.iter().map(|step| u32::from(step.0 < Step::TICK)).sum::<u32>();
+        begun(self.rows.as_flattened()) + self.tails.iter().map(|tail| begun(tail)).sum::<u32>()
+    }
+
     /// Plays whole episodes of at least `wanted` steps in all. Where that is little for four walkers, who may each
     /// end in the midst of a long episode, there is one.
-    pub fn play<P: Player>(&mut self, course: &Course, player: &P, wanted: u32, rng: &mut impl Rng) {
-        let has_own_bits = |walker: usize| P::IS_WIDE || walker.is_multiple_of(2);
-        let is_much = wanted / WALKERS as u32 >= course.horizon;
+    pub fn play(&mut self, course: &Course, player: &impl Player, wanted: u32, luck: &mut Luck<impl Rng + Clone>) {
+        if course.is_slippery {
+            self.play_on::<true, _>(course, player, wanted, luck);
+        } else {
+            self.play_on::<false, _>(course, player, wanted, luck);
+        }
+    }
+
+    #[inline(always)]
+    fn play_on<const SLIPS: bool, P: Player>(
+        &mut self,
+        course: &Course,
+        player: &P,
+        wanted: u32,
+        luck: &mut Luck<impl Rng + Clone>,
+    ) {
+        let is_much = wanted / WALKERS as u32 >= course.end / Step::TICK;
         let rounds = if is_much { wanted.div_ceil(WALKERS as u32) as usize } else { 0 };
         self.rows.resize(rounds, [Step::default(); WALKERS]);
-        let mut walkers = [Walker::default(); WALKERS].map(|_| Walker::begin(course, player, rng));
+        let [mut a, mut b, mut c, mut d] = [(); WALKERS].map(|()| Walker::begin(course, luck));
+        // A copy close at hand, which stays in registers.
+        let mut steps = luck.steps.clone();
         for row in &mut self.rows {
-            let mut bits = 0;
-            for (i, (walker, step)) in walkers.iter_mut().zip(row).enumerate() {
-                // Of 64 bits, two walkers take a half each where that is enough.
-                bits = if has_own_bits(i) { rng.next_u64() } else { bits >> 32 };
-                *step = walker.step(course, player, bits, rng);
-            }
+            let bits = steps.next_u64();
+            row[0] = a.step::<SLIPS>(course, player, bits, &mut steps, &mut luck.starts);
+            // Of 64 bits, two walkers take a half each where that is enough.
+            let bits = if P::IS_WIDE { steps.next_u64() } else { bits >> 32 };
+            row[1] = b.step::<SLIPS>(course, player, bits, &mut steps, &mut luck.starts);
+            let bits = steps.next_u64();
+            row[2] = c.step::<SLIPS>(course, player, bits, &mut steps, &mut luck.starts);
+            let bits = if P::IS_WIDE { steps.next_u64() } else { bits >> 32 };
+            row[3] = d.step::<SLIPS>(course, player, bits, &mut steps, &mut luck.starts);
         }
+        luck.steps = steps;
         let mut played = WALKERS * rounds;
-        for (walker, tail) in walkers.iter_mut().zip(&mut self.tails) {
+        for (mut walker, tail) in [a, b, c, d].into_iter().zip(&mut self.tails) {
             tail.clear();
-            while walker.time > 0 || played < wanted as usize {
-                let bits = rng.next_u64();
-                tail.push(walker.step(course, player, bits, rng));
+            while walker.clock > 0 || played < wanted as usize {
+                let bits = luck.steps.next_u64();
+                tail.push(walker.step::<SLIPS>(course, player, bits, &mut luck.steps, &mut luck.starts));
                 played += 1;
             }
         }
@@ -200,22 +277,22 @@ impl Batch {
         &mut self,
         course: &Course,
         wanted: u32,
-        rng: &mut impl Rng,
-        mut act: impl FnMut(usize, u32, u64) -> (usize, usize),
+        luck: &mut Luck<impl Rng>,
+        mut act: impl FnMut(usize, usize, u64) -> (usize, usize),
     ) {
         self.rows.clear();
         self.tails.iter_mut().for_each(Vec::clear);
         let tail = &mut self.tails[0];
-        while tail.len() < wanted as usize {
-            let mut state = course.starts[one_of(course.starts.len(), rng.next_u32())] as usize;
-            let mut time = 0;
-            while state != course.goal && time < course.horizon {
-                let (context, action) = act(state, time, rng.next_u64());
-                let pair = context * course.next.len() + state;
-                tail.push(Step((pair * ACTIONS + action) as u32 | time << Step::BITS));
-                state = course.lead(state, action, rng);
-                time += 1;
-            }
+        let mut walker = Walker::begin(course, luck);
+        while walker.clock > 0 || tail.len() < wanted as usize {
+            let (context, action) = act(walker.place, Step(walker.clock).time(), luck.steps.next_u64());
+            let pair = context * course.cells + walker.place;
+            let player = Chosen { pair, action };
+            tail.push(if course.is_slippery {
+                walker.step::<true>(course, &player, 0, &mut luck.steps, &mut luck.starts)
+            } else {
+                walker.step::<false>(course, &player, 0, &mut luck.steps, &mut luck.starts)
+            });
         }
     }
 

@@ -164,7 +164,8 @@ impl Algorithm for ExactApe {
         let n = f64::from(self.experts.config.experts);
         let visited = |pair: usize| experts[pair] / all + clone[pair % clone.len()] / by_clone / n;
         let weight = Self::EXPLORATION * self.experts.config.entropy_weight(self.experts.updates);
-        self.experts.ascend(logits, weight, visited);
+        let ensemble = self.experts.ensemble();
+        self.experts.ascend(&ensemble, logits, weight, visited);
         ensemble_return
     }
 }

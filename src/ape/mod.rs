@@ -16,9 +16,10 @@ pub mod observer;
 mod pg_ape;
 mod recurrent;
 mod reward;
+mod softmax;
 
 pub use adam::Adam;
-pub use algorithm::{Algorithm, Experts, Trainer, softmax};
+pub use algorithm::{Algorithm, Experts, Trainer};
 pub use choice::{Choice, ChoiceError, Model, Parameter};
 pub use config::{AlgorithmKind, BaselineKind, Config, GradientKind, ReturnToGo};
 pub use demonstrate::{Demonstrator, Episode};
@@ -29,3 +30,4 @@ pub use figures::{Figures, Identity};
 pub use pg_ape::{Gradient, PgApe};
 pub use recurrent::{Labelled, Network};
 pub use reward::AdversaryReward;
+pub use softmax::softmax;

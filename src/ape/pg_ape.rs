@@ -8,12 +8,11 @@
 //! of a batch but how often each (context, state, action) was taken and the sum of the returns that followed: a
 //! [`Tally`].
 
-use rand::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::adam::Adam;
 use super::algorithm::{Algorithm, Experts};
-use super::batch::{Batch, ClonePlayer, Course, EnsemblePlayer, WALKERS};
+use super::batch::{Batch, ClonePlayer, Course, EnsemblePlayer, Luck, WALKERS};
 use super::observer::{Memory, Observer};
 use super::{AdversaryReward, BaselineKind, Config, Contexts, Ensemble, GradientKind, ReturnToGo};
 use crate::mdp::{ACTIONS, ActionDraw, Draw, Grid, Policy};
@@ -23,13 +22,20 @@ use crate::mdp::{ACTIONS, ActionDraw, Draw, Grid, Policy};
 struct Tally {
     /// `[n][S][5]`: how often each action was taken, and the sum of the returns R(t) that followed.
     entries: Vec<[f64; 2]>,
+    /// `[n][S]`: the same summed over actions.
+    pairs: Vec<[f64; 2]>,
     episodes: f64,
     steps: f64,
 }
 
 impl Tally {
-    fn new(entries: usize) -> Tally {
-        Tally { entries: vec![[0.0; 2]; entries], episodes: 0.0, steps: 0.0 }
+    fn new(pairs: usize) -> Tally {
+        Tally { entries: vec![[0.0; 2]; pairs * ACTIONS], pairs: vec![[0.0; 2]; pairs], episodes: 0.0, steps: 0.0 }
+    }
+
+    /// `[n][S]`, the entries of each pair (context, state).
+    fn by_pair(&self) -> &[[[f64; 2]; ACTIONS]] {
+        self.entries.as_chunks().0
     }
 
     /// Counts a batch. `reward`: of an entry; `weights`: what the return after step t counts, `[T]`, where that is
@@ -37,7 +43,6 @@ impl Tally {
     #[inline(always)]
     fn count(&mut self, batch: &Batch, discount: f64, reward: impl Fn(usize) -> f64, weights: Option<&[f64]>) {
         self.entries.fill([0.0; 2]);
-        let mut episodes = 0;
         // The return that follows each walker's step before this one; 0 after an episode's end.
         let mut later = [0.0; WALKERS];
         batch.backwards(|walker, step| {
@@ -47,18 +52,14 @@ impl Tally {
             entry[0] += 1.0;
             entry[1] += weights.map_or(to_go, |weights| weights[step.time()] * to_go);
             let is_first = step.time() == 0;
-            episodes += u32::from(is_first);
             // Without a branch, which would often be mistaken.
             *later = f64::from_bits(to_go.to_bits() & u64::from(is_first).wrapping_sub(1));
         });
-        self.episodes = f64::from(episodes);
+        self.episodes = f64::from(batch.episodes());
         self.steps = batch.steps() as f64;
-    }
-
-    /// Visits and returns of the pair (context, state) with this number, over its actions.
-    fn pair(&self, pair: usize) -> (f64, f64) {
-        let actions = &self.entries[pair * ACTIONS..][..ACTIONS];
-        actions.iter().fold((0.0, 0.0), |sum, entry| (sum.0 + entry[0], sum.1 + entry[1]))
+        for (pair, actions) in self.pairs.iter_mut().zip(self.entries.as_chunks::<ACTIONS>().0) {
+            *pair = actions.iter().fold([0.0; 2], |sum, entry| [sum[0] + entry[0], sum[1] + entry[1]]);
+        }
     }
 }
 
@@ -75,7 +76,7 @@ pub struct Gradient {
 #[derive(Clone)]
 pub struct PgApe {
     experts: Experts,
-    rng: Xoshiro256PlusPlus,
+    luck: Luck<Xoshiro256PlusPlus>,
     observer: Box<dyn Observer>,
     /// φ. `joint`: Ṽ_c, `[n][S]`. `separate`: V_c, `[n][S]`, then V_o, `[S]`.
     values: Vec<f64>,
@@ -84,7 +85,8 @@ pub struct PgApe {
     weights: Option<Vec<f64>>,
     /// r̃ by entry, `[n][S][5]`, where the clone's reward is not the experts'.
     adversary_reward: Option<Vec<f64>>,
-    course: Course,
+    /// The grid, a copy for each expert, and that of the clone.
+    courses: [Course; 2],
     /// What is played in; made anew in every update.
     batch: Batch,
     actions: Vec<ActionDraw>,
@@ -105,17 +107,17 @@ impl PgApe {
         let weights = (config.return_to_go == ReturnToGo::FromStart).then(|| (0..horizon).map(weight).collect());
         let by_entry = |reward: &AdversaryReward| reward.table(&grid).as_flattened().repeat(experts);
         PgApe {
-            rng: Xoshiro256PlusPlus::seed_from_u64(u64::from(config.seed)),
+            luck: Luck::new(config.seed),
             observer: config.observer.build(&grid, experts),
             values: vec![0.0; values],
             values_adam: Adam::new(values),
             weights,
             adversary_reward: config.adversary_reward.as_ref().map(by_entry),
-            course: Course::new(&grid, config.horizon),
+            courses: [experts, 1].map(|copies| Course::new(&grid, config.horizon, copies)),
             batch: Batch::default(),
             actions: Vec::new(),
-            ensemble_tally: Tally::new(pairs * ACTIONS),
-            clone_tally: Tally::new(pairs * ACTIONS),
+            ensemble_tally: Tally::new(pairs),
+            clone_tally: Tally::new(pairs),
             experts: Experts::new(grid, config, vec![0.0; pairs * ACTIONS]),
         }
     }
@@ -133,11 +135,10 @@ impl PgApe {
     /// Plays τ₁: an expert is drawn for an episode and acts for all of it.
     fn play_ensemble(&mut self, ensemble: &Ensemble) {
         let Config { batch_steps, discount, observer, .. } = self.experts.config;
-        let cells = self.experts.grid.cells();
         self.actions.clear();
         self.actions.extend(ensemble.policies().iter().flat_map(Policy::rows).map(|row| ActionDraw::new(row)));
-        let player = EnsemblePlayer { actions: &self.actions, cells };
-        self.batch.play(&self.course, &player, batch_steps, &mut self.rng);
+        let player = EnsemblePlayer { actions: &self.actions };
+        self.batch.play(&self.courses[0], &player, batch_steps, &mut self.luck);
         count(&mut self.ensemble_tally, &self.batch, discount, None, self.weights.as_deref());
         if observer.model().learns {
             self.show();
@@ -181,14 +182,14 @@ impl PgApe {
         let draw = |state| Draw::new(contexts.row(state));
         let contexts: Vec<Draw<ENDS>> = (0..self.experts.grid.cells()).map(draw).collect();
         let player = ClonePlayer { actions: &self.actions, contexts: &contexts };
-        self.batch.play(&self.course, &player, self.experts.config.batch_steps, &mut self.rng);
+        self.batch.play(&self.courses[1], &player, self.experts.config.batch_steps, &mut self.luck);
     }
 
     fn play_remembering(&mut self, experts: usize, memory: &dyn Memory) {
         let (actions, cells) = (&self.actions, self.experts.grid.cells());
         let mut remembered = Vec::new();
         let mut p = vec![0.0; experts];
-        self.batch.play_one(&self.course, self.experts.config.batch_steps, &mut self.rng, |state, time, bits| {
+        self.batch.play_one(&self.courses[1], self.experts.config.batch_steps, &mut self.luck, |state, time, bits| {
             if time == 0 {
                 remembered = memory.start();
             }
@@ -204,44 +205,38 @@ impl PgApe {
     fn policy_gradient(&self, ensemble: &Ensemble, contexts: &Contexts) -> Vec<f64> {
         let (beta, cells) = (self.experts.config.beta, self.experts.grid.cells());
         let pairs = self.experts.config.experts as usize * cells;
-        let mut gradient = vec![0.0; pairs * ACTIONS];
-        let mut add = |pair: usize, score: [f64; ACTIONS]| {
-            // Σ_a score(a) ∇ log π_c(a|s), for a softmax: score(b) − π(b) Σ_a score(a).
-            let pi = ensemble.policies()[pair / cells].row(pair % cells);
-            let sum: f64 = score.iter().sum();
-            for b in 0..ACTIONS {
-                gradient[pair * ACTIONS + b] += score[b] - pi[b] * sum;
+        // ∂J/∂log π_c(a|s), `[n][S][5]`: Σ over a tally's entries of one (context, state), the returns, times `scale`,
+        // less a baseline.
+        let mut scores = vec![[0.0; ACTIONS]; pairs];
+        let add = |score: &mut [f64; ACTIONS], tally: &[[f64; 2]; ACTIONS], scale: f64, baseline: f64| {
+            for (score, [count, returns]) in score.iter_mut().zip(tally) {
+                *score += scale * returns - baseline * count;
             }
         };
-        // Σ over a tally's entries of one (context, state): the returns, times `scale`, less a baseline.
-        let advantages = |tally: &Tally, pair: usize, scale: f64, baseline: f64| -> [f64; ACTIONS] {
-            std::array::from_fn(|action| {
-                let entry = pair * ACTIONS + action;
-                scale * tally.entries[entry][1] - baseline * tally.entries[entry][0]
-            })
-        };
         // G₁ = 1/N₁ Σ ∇ log π_c(a|s) Ã(t), Ã(t) = R(t) − Ṽ_c(s).
-        let per_episode = 1.0 / self.ensemble_tally.episodes;
-        for pair in 0..pairs {
-            add(pair, advantages(&self.ensemble_tally, pair, 1.0, self.values[pair]).map(|a| a * per_episode));
+        let scale = 1.0 / self.ensemble_tally.episodes;
+        for ((score, tally), value) in scores.iter_mut().zip(self.ensemble_tally.by_pair()).zip(&self.values) {
+            add(score, tally, scale, scale * value);
         }
         // G₂ = 1/N₂ Σ ∇ log π_o(a|s) Ã(t), Ã(t) = −βR(t) − Ṽ_o(s).
-        let per_episode = 1.0 / self.clone_tally.episodes;
+        let tallies = self.clone_tally.by_pair();
+        let scale = 1.0 / self.clone_tally.episodes;
+        let kind = self.experts.config.baseline;
         match self.experts.config.gradient {
             GradientKind::SampledContext => {
-                for pair in 0..pairs {
-                    let baseline = match self.experts.config.baseline {
+                for (pair, (score, tally)) in scores.iter_mut().zip(tallies).enumerate() {
+                    let baseline = match kind {
                         BaselineKind::Joint => self.values[pair],
                         BaselineKind::Separate => -beta * self.values[pairs + pair % cells],
                     };
-                    add(pair, advantages(&self.clone_tally, pair, -beta, baseline).map(|a| a * per_episode));
+                    add(score, tally, -beta * scale, scale * baseline);
                 }
             }
             GradientKind::Mixture => {
                 for state in 0..cells {
                     let p = contexts.row(state);
                     // The score does not depend on the context drawn, so neither may the baseline.
-                    let baseline = match self.experts.config.baseline {
+                    let baseline = match kind {
                         BaselineKind::Joint => {
                             p.iter().enumerate().map(|(c, p)| p * self.values[c * cells + state]).sum()
                         }
@@ -250,47 +245,47 @@ impl PgApe {
                     let mut advantage = [0.0; ACTIONS];
                     let mut mixed = [0.0; ACTIONS];
                     for (c, p) in p.iter().enumerate() {
-                        let drawn = advantages(&self.clone_tally, c * cells + state, -beta, baseline);
-                        let pi = ensemble.policies()[c].row(state);
-                        for action in 0..ACTIONS {
-                            advantage[action] += drawn[action];
-                            mixed[action] += p * pi[action];
-                        }
+                        add(&mut advantage, &tallies[c * cells + state], -beta * scale, scale * baseline);
+                        mixed.iter_mut().zip(ensemble.policies()[c].row(state)).for_each(|(sum, pi)| *sum += p * pi);
                     }
                     for (c, p) in p.iter().enumerate() {
                         let pi = ensemble.policies()[c].row(state);
-                        // Responsibility of expert c for the action: p(c|s) π_c(a|s) / π_o(a|s).
-                        add(
-                            c * cells + state,
-                            std::array::from_fn(|action| {
-                                let share = if mixed[action] > 0.0 { p * pi[action] / mixed[action] } else { 0.0 };
-                                share * advantage[action] * per_episode
-                            }),
-                        );
+                        for (action, score) in scores[c * cells + state].iter_mut().enumerate() {
+                            // Responsibility of expert c for the action: p(c|s) π_c(a|s) / π_o(a|s).
+                            let share = if mixed[action] > 0.0 { p * pi[action] / mixed[action] } else { 0.0 };
+                            *score += share * advantage[action];
+                        }
                     }
                 }
             }
         }
-        gradient
+        // Σ_a score(a) ∇ log π_c(a|s), for a softmax: score(b) − π(b) Σ_a score(a).
+        for (policy, scores) in ensemble.policies().iter().zip(scores.chunks_mut(cells)) {
+            for (pi, score) in policy.rows().iter().zip(scores) {
+                let sum: f64 = score.iter().sum();
+                score.iter_mut().zip(pi).for_each(|(score, pi)| *score -= pi * sum);
+            }
+        }
+        scores.into_flattened()
     }
 
     /// −∇J(φ) (paper, Eq. 4): the way down the squared error of the baselines, per episode.
     fn value_gradient(&self) -> Vec<f64> {
         let Config { beta, value_weight, baseline, .. } = self.experts.config;
-        let pairs = self.experts.config.experts as usize * self.experts.grid.cells();
+        let (pairs, cells) = (self.ensemble_tally.pairs.len(), self.experts.grid.cells());
+        let fit = |tally: &Tally, pair: usize, scale: f64, value: f64| {
+            let [count, returns] = tally.pairs[pair];
+            value_weight / tally.episodes * (scale * returns - count * value)
+        };
         let mut gradient = vec![0.0; self.values.len()];
         for pair in 0..pairs {
-            let mut fit = |tally: &Tally, index: usize, scale: f64| {
-                let (count, returns) = tally.pair(pair);
-                let error = scale * returns - count * self.values[index];
-                gradient[index] += value_weight * error / tally.episodes;
+            gradient[pair] += fit(&self.ensemble_tally, pair, 1.0, self.values[pair]);
+            // A baseline of its own is fitted to R itself, so that β can change while it trains.
+            let (index, scale) = match baseline {
+                BaselineKind::Joint => (pair, -beta),
+                BaselineKind::Separate => (pairs + pair % cells, 1.0),
             };
-            fit(&self.ensemble_tally, pair, 1.0);
-            match baseline {
-                BaselineKind::Joint => fit(&self.clone_tally, pair, -beta),
-                // Fitted to R itself, so that β can change while it trains.
-                BaselineKind::Separate => fit(&self.clone_tally, pairs + pair % self.experts.grid.cells(), 1.0),
-            }
+            gradient[index] += fit(&self.clone_tally, pair, scale, self.values[index]);
         }
         gradient
     }
@@ -350,9 +345,9 @@ impl Algorithm for PgApe {
         // 4: gradient update on the experts, θ ← θ + α_θ ∇J(θ).
         let gradient = self.policy_gradient(&ensemble, &contexts);
         let value_gradient = self.value_gradient();
-        let share = |tally: &Tally, pair| tally.pair(pair).0 / tally.steps;
+        let share = |tally: &Tally, pair: usize| tally.pairs[pair][0] / tally.steps;
         let visited = |pair| share(&self.ensemble_tally, pair) + share(&self.clone_tally, pair);
-        self.experts.ascend(gradient, self.experts.config.entropy_weight(self.experts.updates), visited);
+        self.experts.ascend(&ensemble, gradient, self.experts.config.entropy_weight(self.experts.updates), visited);
         // 5: update of the value function, φ ← φ − α_φ ∇J(φ).
         self.values_adam.ascend(&mut self.values, &value_gradient, self.experts.config.learning_rate);
         -self.ensemble_tally.steps / self.ensemble_tally.episodes

@@ -7,24 +7,26 @@ use super::{ACTIONS, Grid};
 /// Draws one of up to `ENDS` + 1 outcomes with given probabilities, without a branch.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Draw<const ENDS: usize> {
-    /// Upper ends of all outcomes' intervals on 0..2³¹ but the last; 31 bits, so that probability 1 has one too and
-    /// an outcome of probability 0 is never drawn.
-    ends: [u32; ENDS],
+    /// Upper ends of all outcomes' intervals on 0..2³⁰ but the last; signed and not of all bits, so that probability 1
+    /// has one too, an outcome of probability 0 is never drawn, and processors compare all at once.
+    ends: [i32; ENDS],
 }
 
 /// The draw of an action.
 pub type ActionDraw = Draw<{ ACTIONS - 1 }>;
 
 impl<const ENDS: usize> Draw<ENDS> {
-    const SCALE: f64 = (1u32 << 31) as f64;
+    const SCALE: f64 = (1 << 30) as f64;
+    /// Adding it rounds to a whole number, which then stands in the lowest bits.
+    const ROUND: f64 = (1u64 << 52) as f64;
 
     /// `probabilities`: at most `ENDS` + 1 of them, with sum 1.
     pub fn new(probabilities: &[f64]) -> Self {
-        let mut ends = [1 << 31; ENDS];
+        let mut ends = [1 << 30; ENDS];
         let mut sum = 0.0;
         for (end, p) in ends.iter_mut().zip(probabilities) {
             sum += p;
-            *end = (sum * Self::SCALE + 0.5) as u32;
+            *end = (sum * Self::SCALE + Self::ROUND).to_bits() as i32;
         }
         Draw { ends }
     }
@@ -32,9 +34,9 @@ impl<const ENDS: usize> Draw<ENDS> {
     /// The outcome that 32 uniform bits stand for.
     #[inline]
     pub fn outcome(&self, bits: u32) -> usize {
-        let x = bits >> 1;
+        let x = (bits >> 2) as i32;
         // The last outcome takes what is left, whatever rounding did to the sum.
-        self.ends.iter().map(|&end| usize::from(x >= end)).sum()
+        self.ends.iter().map(|&end| ((end + !x) as u32) >> 31).sum::<u32>() as usize
     }
 }
 
