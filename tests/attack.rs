@@ -8,7 +8,7 @@ use ape_lab::ape::{Config, Ensemble, Trainer};
 use ape_lab::attack::{AttackerChoice, Cloned, TRIALS, Target, simulate};
 use ape_lab::experiment::{Preset, ensemble_returns};
 use ape_lab::mdp::{ACTIONS, Grid, GridSpec, Policy, Starts, occupancy};
-use rand::{RngExt, SeedableRng};
+use rand::{Rng, RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 const T: u32 = 100;
@@ -200,7 +200,7 @@ fn dropping_failures_is_counted_right() {
     let mut dropped = 0;
     for episode in 0..400_000 {
         let policy = &ensemble.policies()[episode % 2];
-        let mut state = starts.start(&mut rng);
+        let mut state = starts.start(rng.next_u32());
         let mut taken = Vec::new();
         while state != grid.goal() && taken.len() < horizon as usize {
             let mut x = rng.random::<f64>();

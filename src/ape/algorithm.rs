@@ -36,13 +36,7 @@ impl Experts {
     /// θ ← θ + α_θ ∇J(θ), with the bonus on the entropy of the policies where they went: `visited` is the share of
     /// visits to the pair (context, state) of this number, `weight` that of the bonus. `ensemble`: the experts as
     /// they are now.
-    pub fn ascend(
-        &mut self,
-        ensemble: &Ensemble,
-        mut gradient: Vec<f64>,
-        weight: f64,
-        visited: impl Fn(usize) -> f64,
-    ) {
+    pub fn ascend(&mut self, ensemble: &Ensemble, mut gradient: Vec<f64>, weight: f64, visited: impl Fn(usize) -> f64) {
         if weight > 0.0 {
             add_entropy_bonus(&self.logits, ensemble, weight, visited, &mut gradient);
         }

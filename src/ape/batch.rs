@@ -54,7 +54,8 @@ impl Course {
         let cells = grid.cells();
         let next = |place: usize| {
             let to = grid.next(place % cells).map(|state| state as usize);
-            let to = to.map(|state| if state == grid.goal() { Self::GOAL } else { (place - place % cells + state) as u16 });
+            let to =
+                to.map(|state| if state == grid.goal() { Self::GOAL } else { (place - place % cells + state) as u16 });
             std::array::from_fn(|action| to[action.min(ACTIONS - 1)])
         };
         Course {

@@ -13,13 +13,13 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::algorithm::{Algorithm, Experts};
 use super::observer::ObserverChoice;
-use super::{Config, Contexts};
-use crate::mdp::{ACTIONS, Grid, Policy};
+use super::{Config, Contexts, Ensemble};
+use crate::mdp::{ACTIONS, Chain, Grid, Policy, Prospect};
 
 /// A training run by exact gradients.
 pub struct ExactApe {
     experts: Experts,
-    dynamics: Dynamics,
+    prospect: Prospect,
     /// r̃(s, a), `[S][5]`; −1 everywhere where the clone's reward is the experts'.
     clone_reward: Vec<[f64; ACTIONS]>,
 }
@@ -40,14 +40,18 @@ impl ExactApe {
             Some(reward) => reward.table(&grid),
             None => vec![[-1.0; ACTIONS]; grid.cells()],
         };
-        let dynamics = Dynamics::new(&grid, config.horizon);
-        ExactApe { dynamics, clone_reward, experts: Experts::new(grid, config, logits) }
+        ExactApe { prospect: Prospect::default(), clone_reward, experts: Experts::new(grid, config, logits) }
     }
 
     /// J of the experts as they are, its gradient by the logits `[n][S][5]`, the ensemble's part of J, and how
     /// often each cell is visited by each expert and by the clone: `[n + 1][S]`.
     pub fn gradient(&mut self) -> ExactGradient {
-        let ensemble = self.experts.ensemble();
+        self.gradient_of(&self.experts.ensemble())
+    }
+
+    /// The same, the experts being known.
+    fn gradient_of(&mut self, ensemble: &Ensemble) -> ExactGradient {
+        let task = (&self.experts.grid, self.experts.config.horizon);
         let (n, cells) = (ensemble.experts(), self.experts.grid.cells());
         let beta = self.beta_now();
         let share = 1.0 / n as f64;
@@ -56,8 +60,8 @@ impl ExactApe {
         let own_reward = vec![[-1.0; ACTIONS]; cells];
         let mut own = 0.0;
         for (policy, by_policy) in ensemble.policies().iter().zip(by_policy.chunks_mut(cells)) {
-            own += share * self.dynamics.differentiate(&self.experts.grid, policy, &own_reward, share, by_policy);
-            visits.extend_from_slice(&self.dynamics.visits);
+            own += share * differentiate(&mut self.prospect, task, policy, &own_reward, share, by_policy);
+            visits.extend_from_slice(&self.prospect.visits);
         }
         let is_occupancy = self.experts.config.observer == ObserverChoice::OCCUPANCY;
         let contexts = if is_occupancy {
@@ -67,8 +71,8 @@ impl ExactApe {
         };
         let clone = ensemble.cloned(&contexts);
         let mut by_clone = vec![[0.0; ACTIONS]; cells];
-        let denied = self.dynamics.differentiate(&self.experts.grid, &clone, &self.clone_reward, -beta, &mut by_clone);
-        visits.extend_from_slice(&self.dynamics.visits);
+        let denied = differentiate(&mut self.prospect, task, &clone, &self.clone_reward, -beta, &mut by_clone);
+        visits.extend_from_slice(&self.prospect.visits);
         for (pair, by_policy) in by_policy.iter_mut().enumerate() {
             let p = contexts.row(pair % cells)[pair / cells];
             for (sum, by_clone) in by_policy.iter_mut().zip(&by_clone[pair % cells]) {
@@ -84,13 +88,7 @@ impl ExactApe {
                     if all > 0.0 { (0..ACTIONS).map(change).sum::<f64>() / all } else { 0.0 }
                 };
                 let worth: Vec<_> = (0..cells).map(|state| [worth(state); ACTIONS]).collect();
-                self.dynamics.differentiate(
-                    &self.experts.grid,
-                    policy,
-                    &worth,
-                    1.0,
-                    &mut by_policy[c * cells..][..cells],
-                );
+                differentiate(&mut self.prospect, task, policy, &worth, 1.0, &mut by_policy[c * cells..][..cells]);
             }
         }
         let mut logits = vec![0.0; self.experts.logits.len()];
@@ -141,7 +139,7 @@ impl Algorithm for ExactApe {
 
     fn boxed(&self) -> Box<dyn Algorithm> {
         let (experts, clone_reward) = (self.experts.clone(), self.clone_reward.clone());
-        Box::new(ExactApe { dynamics: Dynamics::new(&experts.grid, experts.config.horizon), experts, clone_reward })
+        Box::new(ExactApe { prospect: Prospect::default(), experts, clone_reward })
     }
 
     fn experts_mut(&mut self) -> &mut Experts {
@@ -158,93 +156,42 @@ impl Algorithm for ExactApe {
     }
 
     fn update(&mut self) -> f64 {
-        let ExactGradient { logits, ensemble_return, visits, .. } = self.gradient();
+        let ensemble = self.experts.ensemble();
+        let ExactGradient { logits, ensemble_return, visits, .. } = self.gradient_of(&ensemble);
         let (experts, clone) = visits.split_at(self.experts.config.experts as usize * self.experts.grid.cells());
         let (all, by_clone) = (experts.iter().sum::<f64>(), clone.iter().sum::<f64>());
         let n = f64::from(self.experts.config.experts);
         let visited = |pair: usize| experts[pair] / all + clone[pair % clone.len()] / by_clone / n;
         let weight = Self::EXPLORATION * self.experts.config.entropy_weight(self.experts.updates);
-        let ensemble = self.experts.ensemble();
         self.experts.ascend(&ensemble, logits, weight, visited);
         ensemble_return
     }
 }
 
-/// T steps of a policy, forwards and backwards; keeps its tables between calls.
-struct Dynamics {
-    horizon: usize,
-    /// What is to come with k steps left, `[T][S]`, k = 0…T − 1; empty until it is needed.
-    ahead: Vec<f64>,
-    /// Probability of being at a cell now, and a step later, `[S]`.
-    now: Vec<f64>,
-    next: Vec<f64>,
-    /// Expected visits within T steps, `[S]`.
-    visits: Vec<f64>,
-}
-
-impl Dynamics {
-    fn new(grid: &Grid, horizon: u32) -> Dynamics {
-        let (cells, horizon) = (grid.cells(), horizon as usize);
-        let zeros = || vec![0.0; cells];
-        Dynamics { horizon, ahead: Vec::new(), now: zeros(), next: zeros(), visits: zeros() }
+/// Expected return of T steps of `policy` for a reward r(s, a), mean over starts; adds `scale` times its derivative by
+/// π(a|s) to `by_policy`, `[S][5]`.
+fn differentiate(
+    prospect: &mut Prospect,
+    task: (&Grid, u32),
+    policy: &Policy,
+    reward: &[[f64; ACTIONS]],
+    scale: f64,
+    by_policy: &mut [[f64; ACTIONS]],
+) -> f64 {
+    let (grid, horizon) = task;
+    let mut immediate = vec![0.0; grid.cells()];
+    for &state in grid.starts() {
+        let state = state as usize;
+        immediate[state] = policy.row(state).iter().zip(&reward[state]).map(|(p, reward)| p * reward).sum();
     }
-
-    /// Expected return of T steps of `policy` for a reward r(s, a), mean over starts; adds `scale` times its
-    /// derivative by π(a|s) to `by_policy`, `[S][5]`.
-    fn differentiate(
-        &mut self,
-        grid: &Grid,
-        policy: &Policy,
-        reward: &[[f64; ACTIONS]],
-        scale: f64,
-        by_policy: &mut [[f64; ACTIONS]],
-    ) -> f64 {
-        let cells = grid.cells();
-        let executed: Vec<_> = grid.starts().iter().map(|&s| grid.executed(policy.row(s as usize))).collect();
-        self.ahead.resize(cells * self.horizon, 0.0);
-        let expected = |state: usize| -> f64 { (0..ACTIONS).map(|a| policy.row(state)[a] * reward[state][a]).sum() };
-        let immediate: Vec<f64> = grid.starts().iter().map(|&s| expected(s as usize)).collect();
-        // Backwards: what is to come.
-        for k in 1..self.horizon {
-            let (before, after) = self.ahead.split_at_mut(k * cells);
-            let before = &before[(k - 1) * cells..];
-            for ((&state, executed), immediate) in grid.starts().iter().zip(&executed).zip(&immediate) {
-                let to = grid.next(state as usize);
-                let later: f64 = (0..ACTIONS).map(|a| executed[a] * before[to[a] as usize]).sum();
-                after[state as usize] = immediate + later;
-            }
+    prospect.look(&Chain::new(grid, policy), horizon, &immediate, 0.0);
+    let Prospect { visits, to_come, .. } = prospect;
+    for &state in grid.starts() {
+        let state = state as usize;
+        for a in 0..ACTIONS {
+            let worth = (1.0 - grid.slip()) * to_come[state][a] + visits[state] * reward[state][a];
+            by_policy[state][a] += scale * worth;
         }
-        // Forwards: where it is; times what is to come.
-        let means_to = scale * (1.0 - grid.slip());
-        self.visits.fill(0.0);
-        self.now.fill(0.0);
-        for &state in grid.starts() {
-            self.now[state as usize] = 1.0 / grid.starts().len() as f64;
-        }
-        for t in 0..self.horizon {
-            let ahead = &self.ahead[(self.horizon - 1 - t) * cells..][..cells];
-            self.next.fill(0.0);
-            for (&state, executed) in grid.starts().iter().zip(&executed) {
-                let state = state as usize;
-                let here = self.now[state];
-                self.visits[state] += here;
-                for a in 0..ACTIONS {
-                    let to = grid.next(state)[a] as usize;
-                    by_policy[state][a] += means_to * here * ahead[to];
-                    self.next[to] += here * executed[a];
-                }
-            }
-            self.next[grid.goal()] = 0.0;
-            std::mem::swap(&mut self.now, &mut self.next);
-        }
-        let mut total = 0.0;
-        for (&state, immediate) in grid.starts().iter().zip(&immediate) {
-            let state = state as usize;
-            total += self.visits[state] * immediate;
-            for a in 0..ACTIONS {
-                by_policy[state][a] += scale * self.visits[state] * reward[state][a];
-            }
-        }
-        total
     }
+    visits.iter().zip(&immediate).map(|(visits, immediate)| visits * immediate).sum()
 }

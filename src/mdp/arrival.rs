@@ -1,38 +1,25 @@
 //! When an episode from one cell arrives: the exact distribution of the hitting time, step by step.
 
+use super::chain::{Chain, Field};
 use super::{Grid, Policy};
 
-/// P(τ = t) for t = 0, 1, 2, … of one stationary policy from one cell, by forward dynamic programming; slip and
-/// walls included, no noise. It never ends: take as many steps as are wanted.
+/// P(τ = t) for t = 0, 1, 2, … of one stationary policy from one cell; slip and walls included, no noise. It never
+/// ends: take as many steps as are wanted.
 pub struct Arrivals {
-    /// Every move that can happen: from, to, probability. Moves from the goal are not among them.
-    moves: Vec<(u32, u32, f64)>,
+    chain: Chain,
     goal: usize,
-    /// P(under way and at s), `[S]`.
-    now: Vec<f64>,
-    next: Vec<f64>,
-    t: u32,
+    /// Probability of being at each cell before the step to come.
+    now: Field,
+    next: Field,
+    is_under_way: bool,
 }
 
 impl Arrivals {
-    /// What is under way with less than this is taken to be nowhere: it would only make numbers denormal.
-    const NOTHING: f64 = 1e-200;
-
     pub fn new(grid: &Grid, policy: &Policy, start: usize) -> Arrivals {
-        let mut moves: Vec<(u32, u32, f64)> = Vec::new();
-        for &from in grid.starts() {
-            let first = moves.len();
-            for (p, &to) in grid.executed(policy.row(from as usize)).into_iter().zip(grid.next(from as usize)) {
-                match moves[first..].iter_mut().find(|(_, other, _)| *other == to) {
-                    Some((.., sum)) => *sum += p,
-                    None if p > 0.0 => moves.push((from, to, p)),
-                    None => {}
-                }
-            }
-        }
-        let mut now = vec![0.0; grid.cells()];
-        now[start] = 1.0;
-        Arrivals { moves, goal: grid.goal(), next: vec![0.0; now.len()], now, t: 0 }
+        let chain = Chain::new(grid, policy);
+        let mut now = chain.field();
+        now.cells_mut()[start] = 1.0;
+        Arrivals { goal: grid.goal(), next: chain.field(), now, chain, is_under_way: false }
     }
 }
 
@@ -40,16 +27,11 @@ impl Iterator for Arrivals {
     type Item = f64;
 
     fn next(&mut self) -> Option<f64> {
-        if self.t > 0 {
-            self.next.fill(0.0);
-            for &(from, to, p) in &self.moves {
-                self.next[to as usize] += p * self.now[from as usize];
-            }
-            self.next.iter_mut().filter(|mass| **mass < Self::NOTHING).for_each(|mass| *mass = 0.0);
+        if std::mem::replace(&mut self.is_under_way, true) {
+            self.chain.forward(&self.now, &mut self.next);
             std::mem::swap(&mut self.now, &mut self.next);
         }
-        self.t += 1;
-        Some(std::mem::take(&mut self.now[self.goal]))
+        Some(std::mem::take(&mut self.now.cells_mut()[self.goal]))
     }
 }
 

@@ -3,6 +3,7 @@
 //! Everything here is exact or a single draw; nothing learns and nothing knows of ensembles.
 
 mod arrival;
+mod chain;
 mod grid;
 mod model;
 mod optimal;
@@ -11,11 +12,12 @@ mod returns;
 mod rollout;
 
 pub use arrival::Arrivals;
+pub use chain::{Chain, Field, Occupancy, Prospect, occupancy};
 pub use grid::{Action, Cell, Grid, GridError, GridSpec};
 pub use model::{Transition, TransitionModel, transition_model};
 pub use optimal::optimal_policy;
 pub use policy::{Policy, PolicyError};
-pub use returns::{CAP, HORIZON, KnownReturns, Occupancy, RETURN_KINDS, ReturnKind, Returns, Solver, Value, occupancy};
+pub use returns::{CAP, HORIZON, KnownReturns, RETURN_KINDS, ReturnKind, Returns, Solver, Value};
 pub use rollout::{ActionDraw, Draw, Starts, one_of};
 
 /// Number of actions.

@@ -8,6 +8,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::chain::within_horizon;
 use super::{ACTIONS, Grid, Policy};
 
 /// Where hitting times are cut for [`Returns::capped_return`], in steps (paper, appendix).
@@ -255,64 +256,10 @@ impl<'g> Solver<'g> {
     }
 }
 
-/// (horizon return, success) by T steps of dynamic programming: with f_t(s) = P(τ_s > t),
-/// E[min(τ, T)] = Σ_{t<T} f_t and P(τ ≤ T) = 1 − f_T.
-fn within_horizon(grid: &Grid, policy: &Policy, horizon: u32) -> (f64, f64) {
-    let executed: Vec<_> = grid.starts().iter().map(|&s| grid.executed(policy.row(s as usize))).collect();
-    let mut under_way = vec![1.0; grid.cells()];
-    under_way[grid.goal()] = 0.0;
-    let mut next = under_way.clone();
-    let mut steps = 0.0;
-    for _ in 0..horizon {
-        for (&state, executed) in grid.starts().iter().zip(&executed) {
-            let state = state as usize;
-            steps += under_way[state];
-            let to = grid.next(state);
-            next[state] = (0..ACTIONS).map(|a| executed[a] * under_way[to[a] as usize]).sum();
-        }
-        std::mem::swap(&mut under_way, &mut next);
-    }
-    let lost: f64 = grid.starts().iter().map(|&s| under_way[s as usize]).sum();
-    (-steps / grid.free_cells() as f64, 1.0 - lost / grid.starts().len() as f64)
-}
-
-/// Where a policy spends its first T steps, from a uniformly drawn start.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Occupancy {
-    /// d(s), `[S]`: expected visits before step T; 0 at the goal and at walls.
-    pub visits: Vec<f64>,
-    /// m(s), `[S]`: probability that the episode is cut off by T at s.
-    pub cut_off: Vec<f64>,
-}
-
-/// Exact occupancy of `policy` over `horizon` steps.
-pub fn occupancy(grid: &Grid, policy: &Policy, horizon: u32) -> Occupancy {
-    let executed: Vec<_> = grid.starts().iter().map(|&s| grid.executed(policy.row(s as usize))).collect();
-    let mut visits = vec![0.0; grid.cells()];
-    let mut now = vec![0.0; grid.cells()];
-    for &state in grid.starts() {
-        now[state as usize] = 1.0 / grid.starts().len() as f64;
-    }
-    let mut next = vec![0.0; grid.cells()];
-    for _ in 0..horizon {
-        next.fill(0.0);
-        for (&state, executed) in grid.starts().iter().zip(&executed) {
-            let state = state as usize;
-            visits[state] += now[state];
-            for (p, &to) in executed.iter().zip(grid.next(state)) {
-                next[to as usize] += p * now[state];
-            }
-        }
-        next[grid.goal()] = 0.0;
-        std::mem::swap(&mut now, &mut next);
-    }
-    Occupancy { visits, cut_off: now }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mdp::GridSpec;
+    use crate::mdp::{GridSpec, occupancy};
     use rand::{RngExt, SeedableRng};
     use rand_xoshiro::Xoshiro256PlusPlus;
 
