@@ -133,10 +133,12 @@ fn dual_ascent_keeps_to_the_constraint() {
         assert!(point.ensemble.horizon_return <= alpha + 0.3, "{alpha}: {point:?}");
         assert!(point.clone.horizon_return < -75.0 && point.beta != 0.6, "{alpha}: {point:?}");
     }
-    // PG-APE has noise to fight with; α well below the optimum is kept.
-    let mut trainer = train(Config { alpha: Some(-20.0), ..Config::default() });
-    let point = CurvePoint::of(&mut trainer);
-    assert!(point.ensemble.horizon_return >= -20.5 && point.clone.horizon_return < -75.0, "{point:?}");
+    // PG-APE has noise to fight with, about 1 step from seed to seed; α well below the optimum is kept in the mean.
+    let points = [1, 2, 3, 4, 5, 6]
+        .map(|seed| CurvePoint::of(&mut train(Config { alpha: Some(-20.0), seed, ..Config::default() })));
+    let mean = points.iter().map(|point| point.ensemble.horizon_return).sum::<f64>() / points.len() as f64;
+    assert!((-21.0..-18.5).contains(&mean), "{mean}: {points:?}");
+    assert!(points.iter().all(|point| point.clone.horizon_return < -70.0), "{points:?}");
 }
 
 /// The semantics of reward: lured into a corner, though the experts go home.
