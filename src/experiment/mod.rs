@@ -21,7 +21,7 @@ pub use curve::{CurvePoint, Denied};
 pub use presets::{PRESETS, Preset};
 pub use race::{Figures, Race, RaceError, Raced, Racer, Run};
 pub use setup::{Course, Setup, SetupError};
-pub use shard::{Difference, Place, Shard, ShardError, SweepPlan, Which, merge};
+pub use shard::{Difference, RunPlace, Shard, ShardError, ShardNumber, SweepPlan, merge_shards};
 pub use statistics::Summary;
 pub use sweep::{Sweep, SweepPoint, SweepRun};
 pub use table1::{MethodRun, Row, Table1};

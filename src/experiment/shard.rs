@@ -16,20 +16,20 @@ use crate::mdp::{Grid, GridSpec, KnownReturns, RETURN_KINDS};
 /// Shard I of K, written `I/K`. Run r of a sweep, counted from 0, is in shard r mod K + 1, so that every shard has
 /// its share of every β.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Which {
+pub struct ShardNumber {
     /// I, from 1.
     pub shard: u32,
     /// K.
     pub shards: u32,
 }
 
-impl Which {
+impl ShardNumber {
     /// Most shards of a sweep.
     pub const MOST: u32 = 10_000;
 
-    fn check(self) -> Result<Which, ShardError> {
+    fn check(self) -> Result<ShardNumber, ShardError> {
         let is_good = (1..=Self::MOST).contains(&self.shards) && (1..=self.shards).contains(&self.shard);
-        if is_good { Ok(self) } else { Err(ShardError::Which(self.to_string())) }
+        if is_good { Ok(self) } else { Err(ShardError::Number(self.to_string())) }
     }
 
     /// The runs of this shard, of so many.
@@ -38,32 +38,32 @@ impl Which {
     }
 }
 
-impl fmt::Display for Which {
+impl fmt::Display for ShardNumber {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}/{}", self.shard, self.shards)
     }
 }
 
-impl FromStr for Which {
+impl FromStr for ShardNumber {
     type Err = ShardError;
 
-    fn from_str(text: &str) -> Result<Which, ShardError> {
-        let wrong = || ShardError::Which(text.to_owned());
+    fn from_str(text: &str) -> Result<ShardNumber, ShardError> {
+        let wrong = || ShardError::Number(text.to_owned());
         let (shard, shards) = text.split_once('/').ok_or_else(wrong)?;
         let number = |text: &str| text.parse().map_err(|_| wrong());
-        Which { shard: number(shard)?, shards: number(shards)? }.check().map_err(|_| wrong())
+        ShardNumber { shard: number(shard)?, shards: number(shards)? }.check().map_err(|_| wrong())
     }
 }
 
 /// Why a shard, or its file, is refused.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ShardError {
-    #[error("{0}: must be I/K, shard I of K, with I from 1 to K and K from 1 to {most}", most = Which::MOST)]
-    Which(String),
+    #[error("{0}: must be I/K, shard I of K, with I from 1 to K and K from 1 to {most}", most = ShardNumber::MOST)]
+    Number(String),
     #[error("{which}: the sweep has {runs} runs, expected K from 1 to {runs}")]
-    Many { which: Which, runs: usize },
+    Many { which: ShardNumber, runs: usize },
     #[error("{which}: {runs} runs in a shard, expected at most {}: take {least} shards or more", Shard::MOST_RUNS)]
-    Large { which: Which, runs: usize, least: usize },
+    Large { which: ShardNumber, runs: usize, least: usize },
     #[error("not a shard of a sweep: {0}; expected what ape sweep --shard writes, a whole file")]
     Json(String),
     #[error("format {0:?}: must be \"ape-sweep-shard\"")]
@@ -77,23 +77,23 @@ pub enum ShardError {
     #[error("sweep.{name} has {found} entries: must have from 1 to 1000")]
     Entries { name: &'static str, found: usize },
     #[error("{run}: {what}")]
-    Run { run: Place, what: String },
+    Run { run: RunPlace, what: String },
     #[error("complete true: {0} missing, expected false")]
     Complete(String),
     #[error("complete false: every run is there, expected true")]
     Incomplete,
     #[error("shard {found}: expected shard {expected}")]
-    Other { found: Which, expected: Which },
+    Other { found: ShardNumber, expected: ShardNumber },
     #[error("{0}")]
-    Mixed(#[from] Difference),
+    Mixed(Box<Difference>),
     #[error("{file}: {difference}, as in {first}")]
-    MixedFiles { file: String, first: String, difference: Difference },
+    MixedFiles { file: String, first: String, difference: Box<Difference> },
     #[error("{0}: given twice, expected every file once")]
     Twice(String),
     #[error("{file}: shard {which}, which is in {first} too: expected every shard once")]
-    Duplicate { file: String, first: String, which: Which },
+    Duplicate { file: String, first: String, which: ShardNumber },
     #[error("{file}: shard {which} is not finished, {missing} missing: expected the same ape sweep to be run again")]
-    Unfinished { file: String, which: Which, missing: String },
+    Unfinished { file: String, which: ShardNumber, missing: String },
     #[error("{0} missing: expected every shard of the sweep")]
     Gaps(String),
 }
@@ -111,13 +111,13 @@ pub struct Difference {
 
 /// One run of a sweep, as sentences name it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Place {
+pub struct RunPlace {
     index: usize,
     beta: f64,
     seed: u32,
 }
 
-impl fmt::Display for Place {
+impl fmt::Display for RunPlace {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "run {} (β {}, seed {})", self.index, self.beta, self.seed)
     }
@@ -190,31 +190,31 @@ impl SweepPlan {
 
     /// What run `index` starts from.
     pub fn setup(&self, index: usize) -> Setup {
-        let Place { beta, seed, .. } = self.place(index);
+        let RunPlace { beta, seed, .. } = self.place(index);
         Setup { grid: self.grid.clone(), config: Config { beta, seed, ..self.config.clone() }, ..Setup::default() }
     }
 
-    fn place(&self, index: usize) -> Place {
+    fn place(&self, index: usize) -> RunPlace {
         let (beta, seed) = Sweep::place(&self.betas, self.seeds, index);
-        Place { index, beta, seed }
+        RunPlace { index, beta, seed }
     }
 
-    /// Whether this is the same sweep as `expected`, to the last bit.
-    fn compare(&self, expected: &SweepPlan) -> Result<(), Difference> {
+    /// Where this is another sweep than `expected`, to the last bit.
+    fn compare(&self, expected: &SweepPlan) -> Option<Box<Difference>> {
         /// Causes before what follows from them.
         const FIELDS: [&str; 6] = ["program", "grid", "config", "betas", "seeds", "digest"];
         let fields = |plan| serde_json::to_value(plan).unwrap_or_default();
         let (found, expected) = (fields(self), fields(expected));
         let differ = |field: &&str| difference(&format!("sweep.{field}"), &found[*field], &expected[*field]);
-        FIELDS.iter().find_map(differ).map_or(Ok(()), Err)
+        FIELDS.iter().find_map(differ)
     }
 }
 
 /// The first leaf in which two values differ, by their text, which holds every bit of a number.
-fn difference(field: &str, found: &Value, expected: &Value) -> Option<Difference> {
+fn difference(field: &str, found: &Value, expected: &Value) -> Option<Box<Difference>> {
     let differ = |found: String, expected: String| {
         let remark = if field == "sweep.digest" { " (by a program that trains otherwise)" } else { "" };
-        Some(Difference { field: field.to_owned(), found, expected, remark })
+        Some(Box::new(Difference { field: field.to_owned(), found, expected, remark }))
     };
     match (found, expected) {
         (Value::Object(found), Value::Object(expected)) => {
@@ -267,8 +267,8 @@ impl Shard {
     pub const LONGEST: usize = 100_000_000;
 
     /// A shard of which no run is done.
-    pub fn new(sweep: SweepPlan, which: Which) -> Result<Shard, ShardError> {
-        let Which { shard, shards } = which;
+    pub fn new(sweep: SweepPlan, which: ShardNumber) -> Result<Shard, ShardError> {
+        let ShardNumber { shard, shards } = which;
         let format = Self::FORMAT.to_owned();
         let shard = Shard { format, version: 1, shard, shards, complete: false, sweep, runs: Vec::new() };
         shard.check_which()?;
@@ -288,8 +288,8 @@ impl Shard {
         Ok(())
     }
 
-    pub fn which(&self) -> Which {
-        Which { shard: self.shard, shards: self.shards }
+    pub fn which(&self) -> ShardNumber {
+        ShardNumber { shard: self.shard, shards: self.shards }
     }
 
     pub fn sweep(&self) -> &SweepPlan {
@@ -327,7 +327,7 @@ impl Shard {
     /// Whether a run belongs here, comes after the one before it, and is made of numbers.
     fn check_run(&self, at: usize) -> Result<(), ShardError> {
         let IndexedRun { index, run } = &self.runs[at];
-        let found = Place { index: *index, beta: run.beta, seed: run.seed };
+        let found = RunPlace { index: *index, beta: run.beta, seed: run.seed };
         let wrong = |what: String| Err(ShardError::Run { run: found, what });
         let (runs, which) = (self.sweep.runs(), self.which());
         if found.index >= runs {
@@ -353,7 +353,9 @@ impl Shard {
 
     /// Takes over the runs that are done from an earlier file, which must be of the same shard of the same sweep.
     pub fn resume(&mut self, earlier: Shard) -> Result<(), ShardError> {
-        earlier.sweep.compare(&self.sweep)?;
+        if let Some(difference) = earlier.sweep.compare(&self.sweep) {
+            return Err(ShardError::Mixed(difference));
+        }
         let (found, expected) = (earlier.which(), self.which());
         if found != expected {
             return Err(ShardError::Other { found, expected });
@@ -396,12 +398,12 @@ impl Shard {
 }
 
 /// Joins the shards of a sweep, each with the name of its file, in any order.
-pub fn merge(files: Vec<(String, Shard)>) -> Result<Sweep, ShardError> {
+pub fn merge_shards(files: Vec<(String, Shard)>) -> Result<Sweep, ShardError> {
     let Some((first, model)) = files.first() else { return Ok(Sweep::default()) };
     let mut by_number: BTreeMap<u32, &String> = BTreeMap::new();
     for (file, shard) in &files {
         let number = difference("shards", &shard.shards.into(), &model.shards.into());
-        if let Err(difference) = shard.sweep.compare(&model.sweep).and(number.map_or(Ok(()), Err)) {
+        if let Some(difference) = shard.sweep.compare(&model.sweep).or(number) {
             return Err(ShardError::MixedFiles { file: file.clone(), first: first.clone(), difference });
         }
         match by_number.insert(shard.shard, file) {
@@ -433,6 +435,8 @@ mod tests {
 
     const SEEDS: u32 = 4;
 
+    type Files = Vec<(String, Shard)>;
+
     fn planned(config: Config) -> SweepPlan {
         let setup = Setup { config: Config { batch_steps: 100, ..config }, ..Setup::default() };
         SweepPlan::new(&setup, vec![0.0, 0.3, 0.6], SEEDS).unwrap()
@@ -440,7 +444,7 @@ mod tests {
 
     /// Figures that need all their digits; nothing is trained for them.
     fn run(plan: &SweepPlan, index: usize) -> SweepRun {
-        let Place { beta, seed, .. } = plan.place(index);
+        let RunPlace { beta, seed, .. } = plan.place(index);
         let figure = -1e-5 / (index as f64 + 3.0);
         let ensemble =
             Returns { capped_return: figure, uncapped_return: figure / 7.0, horizon_return: -0.0, success: 0.1 };
@@ -449,7 +453,7 @@ mod tests {
     }
 
     fn shard(plan: &SweepPlan, shard: u32, shards: u32) -> Shard {
-        let mut shard = Shard::new(plan.clone(), Which { shard, shards }).unwrap();
+        let mut shard = Shard::new(plan.clone(), ShardNumber { shard, shards }).unwrap();
         // In an order in which they may come.
         for index in shard.missing().into_iter().rev() {
             assert!(!shard.complete);
@@ -458,7 +462,7 @@ mod tests {
         shard
     }
 
-    fn shards(plan: &SweepPlan, of: u32) -> Vec<(String, Shard)> {
+    fn shards(plan: &SweepPlan, of: u32) -> Files {
         (1..=of).map(|i| (format!("{i}.json"), shard(plan, i, of))).collect()
     }
 
@@ -469,7 +473,8 @@ mod tests {
         assert_eq!(all.len(), plan.runs());
         assert!((0..plan.runs()).all(|index| plan.setup(index) == all[index]));
         for shards in 1..=12 {
-            let parts = (1..=shards).map(|i| Shard::new(plan.clone(), Which { shard: i, shards }).unwrap().missing());
+            let parts =
+                (1..=shards).map(|i| Shard::new(plan.clone(), ShardNumber { shard: i, shards }).unwrap().missing());
             let parts: Vec<Vec<usize>> = parts.collect();
             let sizes = || parts.iter().map(Vec::len);
             assert!(sizes().max() <= sizes().min().map(|least| least + 1));
@@ -487,7 +492,7 @@ mod tests {
             let read = |(file, shard): (String, Shard)| (file, Shard::parse(&shard.text().unwrap()).unwrap());
             let mut files: Vec<_> = shards(&plan, of).into_iter().map(read).collect();
             files.reverse();
-            let merged = merge(files).unwrap();
+            let merged = merge_shards(files).unwrap();
             assert_eq!(merged, whole);
             assert_eq!(merged.csv(), whole.csv());
             assert_eq!(serde_json::to_string(&merged).unwrap(), serde_json::to_string(&whole).unwrap());
@@ -497,7 +502,7 @@ mod tests {
     #[test]
     fn a_shard_goes_on_from_its_file_and_from_no_other() {
         let plan = planned(Config::default());
-        let new = || Shard::new(plan.clone(), Which { shard: 2, shards: 5 }).unwrap();
+        let new = || Shard::new(plan.clone(), ShardNumber { shard: 2, shards: 5 }).unwrap();
         let mut half = new();
         half.add(6, run(&plan, 6)).unwrap();
         half.add(11, run(&plan, 11)).unwrap();
@@ -518,7 +523,7 @@ mod tests {
     #[test]
     fn a_run_that_does_not_belong_changes_nothing() {
         let plan = planned(Config::default());
-        let mut shard = Shard::new(plan.clone(), Which { shard: 2, shards: 5 }).unwrap();
+        let mut shard = Shard::new(plan.clone(), ShardNumber { shard: 2, shards: 5 }).unwrap();
         shard.add(1, run(&plan, 1)).unwrap();
         let before = shard.clone();
         let mut infinite = run(&plan, 6);
@@ -538,10 +543,10 @@ mod tests {
     #[test]
     fn what_does_not_fit_together_is_not_merged() {
         let plan = planned(Config::default());
-        let sentence = |change: &dyn Fn(&mut Vec<(String, Shard)>)| {
+        let sentence = |change: &dyn Fn(&mut Files)| {
             let mut files = shards(&plan, 4);
             change(&mut files);
-            merge(files).unwrap_err().to_string()
+            merge_shards(files).unwrap_err().to_string()
         };
         let gaps = sentence(&|files| {
             files.remove(2);
@@ -584,18 +589,18 @@ mod tests {
 
     #[test]
     fn which_shard_is_checked_and_so_is_its_size() {
-        assert_eq!("3/7".parse(), Ok(Which { shard: 3, shards: 7 }));
+        assert_eq!("3/7".parse(), Ok(ShardNumber { shard: 3, shards: 7 }));
         for bad in ["0/4", "5/4", "a/b", "", "/", "3", "1/2/3", "-1/4", "1.5/4", "1/0", "1/10001", "1/99999999999"] {
-            let error = bad.parse::<Which>().unwrap_err().to_string();
+            let error = bad.parse::<ShardNumber>().unwrap_err().to_string();
             assert!(error.starts_with(&format!("{bad}: must be I/K, shard I of K, with I from 1")), "{error}");
         }
         let plan = planned(Config::default());
-        let many = Shard::new(plan.clone(), Which { shard: 1, shards: 13 }).unwrap_err();
+        let many = Shard::new(plan.clone(), ShardNumber { shard: 1, shards: 13 }).unwrap_err();
         assert_eq!(many.to_string(), "1/13: the sweep has 12 runs, expected K from 1 to 12");
         let large = SweepPlan { betas: vec![0.5; 1000], seeds: 1000, ..plan };
-        let error = Shard::new(large.clone(), Which { shard: 1, shards: 9 }).unwrap_err().to_string();
+        let error = Shard::new(large.clone(), ShardNumber { shard: 1, shards: 9 }).unwrap_err().to_string();
         assert_eq!(error, "1/9: 111112 runs in a shard, expected at most 100000: take 10 shards or more");
-        assert!(Shard::new(large, Which { shard: 1, shards: 10 }).is_ok());
+        assert!(Shard::new(large, ShardNumber { shard: 1, shards: 10 }).is_ok());
     }
 
     /// The largest shard there can be is shorter than the longest text that is read.

@@ -1,16 +1,17 @@
 //! A sweep on many machines: `ape sweep --shard` writes one shard, `ape merge` joins them all.
 
-use std::sync::Mutex;
+use std::sync::mpsc::{Receiver, channel};
+use std::thread;
 use std::time::{Duration, Instant};
 
-use ape_lab::experiment::{Outcome, Setup, Shard, ShardError, SweepPlan, Task, Which};
+use ape_lab::experiment::{Outcome, Setup, Shard, ShardError, ShardNumber, SweepPlan, SweepRun, Task, merge_shards};
 use clap::ArgMatches;
 
 use super::experiments::{run_each, show_sweep};
 use super::{check_out, read, write};
 
-/// A stop loses at most the runs of so long.
-const SAVED_EVERY: Duration = Duration::from_secs(5);
+/// A run that is done is in the file after so long, and the time of writing it: a stop loses no more of them.
+const SAVED_WITHIN: Duration = Duration::from_secs(5);
 
 fn read_shard(file: &str) -> Result<Shard, String> {
     Shard::parse(&read(file, Shard::LONGEST)?).map_err(|error| format!("{file}: {error}"))
@@ -20,10 +21,24 @@ fn save(file: &str, shard: &Shard) -> Result<(), String> {
     write(file, &shard.text().map_err(|error| error.to_string())?)
 }
 
+/// Adds runs to a shard, and keeps its file up to date, until no more can come.
+fn save_as_they_come(file: &str, mut shard: Shard, done: Receiver<(usize, SweepRun)>) -> Result<(), String> {
+    while let Ok(first) = done.recv() {
+        let saved_by = Instant::now() + SAVED_WITHIN;
+        let next = || done.recv_timeout(saved_by.checked_duration_since(Instant::now())?).ok();
+        // All that come meanwhile are saved at once.
+        let added = std::iter::successors(Some(first), |_| next())
+            .try_for_each(|(index, run)| shard.add(index, run).map_err(|error| error.to_string()));
+        save(file, &shard)?;
+        added?;
+    }
+    Ok(())
+}
+
 /// One shard of a sweep into its file, going on from what the file has.
 pub fn sweep(matches: &ArgMatches, which: &str, setup: &Setup, betas: Vec<f64>, seeds: u32) -> Result<(), String> {
     let flag = |error: ShardError| format!("--shard {error}");
-    let which: Which = which.parse().map_err(flag)?;
+    let which: ShardNumber = which.parse().map_err(flag)?;
     let Some(file) = matches.get_one::<String>("out") else {
         return Err(format!("--shard {which}: expected --out FILE with it, the file of this shard"));
     };
@@ -43,25 +58,19 @@ pub fn sweep(matches: &ArgMatches, which: &str, setup: &Setup, betas: Vec<f64>, 
     save(file, &shard)?;
     let setups = missing.iter().map(|&index| Box::new(shard.sweep().setup(index)));
     let tasks: Vec<Task> = setups.map(|setup| Task::Sweep { setup }).collect();
-    let state = Mutex::new((shard, Instant::now() + SAVED_EVERY));
-    let keep = |task: usize, outcome| {
-        let Outcome::Sweep(run) = outcome else { return Ok(()) };
-        let mut state = state.lock().map_err(|_| "another run was stopped by a fault".to_owned())?;
-        let (shard, next) = &mut *state;
-        shard.add(missing[task], run).map_err(|error| error.to_string())?;
-        let begin = Instant::now();
-        if begin >= *next {
-            save(file, shard)?;
-            // Large files on slow disks are saved less often.
-            *next = Instant::now() + SAVED_EVERY.max(20 * begin.elapsed());
-        }
-        Ok(())
-    };
-    let outcome = run_each(&tasks, &keep);
-    let (shard, _) = state.into_inner().map_err(|error| error.to_string())?;
-    // What is done is kept also where something went wrong.
-    let saved = save(file, &shard);
-    outcome.and(saved)?;
+    thread::scope(|scope| {
+        let (sender, done) = channel();
+        let saver = scope.spawn(|| save_as_they_come(file, shard, done));
+        let keep = |task: usize, outcome| match outcome {
+            // Nobody listens any more when the file could not be written.
+            Outcome::Sweep(run) => sender.send((missing[task], run)).map_err(|_| "stopped".to_owned()),
+            _ => Ok(()),
+        };
+        let computed = run_each(&tasks, &keep);
+        drop(sender);
+        let saved = saver.join().map_err(|_| "the shard was not saved".to_owned())?;
+        saved.and(computed)
+    })?;
     let kept = runs - missing.len();
     say!("{file}: shard {which} is complete (runs: {runs}, kept from before: {kept})");
     Ok(())
@@ -72,6 +81,6 @@ pub fn merge(matches: &ArgMatches) -> Result<(), String> {
     check_out(matches, "out")?;
     let files = matches.get_many::<String>("files").expect("clap requires it");
     let shards = files.map(|file| Ok((file.clone(), read_shard(file)?)));
-    let sweep = ape_lab::experiment::merge(shards.collect::<Result<_, String>>()?);
+    let sweep = merge_shards(shards.collect::<Result<_, String>>()?);
     show_sweep(matches, &sweep.map_err(|error| error.to_string())?)
 }
