@@ -115,7 +115,7 @@ fn bad_flags_get_one_sentence() {
     assert!(complaint(&["train", "--learning-rate"]).contains("--learning-rate"));
     assert!(complaint(&["train", "--no-such-flag"]).contains("--no-such-flag"));
     assert!(complaint(&["train", "--seed", "-1"]).contains("--seed -1"));
-    assert!(complaint(&[]).contains("evaluate, train, model, attack, table1, sweep, results, presets"));
+    assert!(complaint(&[]).contains("evaluate, train, model, attack, table1, sweep, merge, results, presets"));
     assert!(complaint(&["train", "--alpha", "5"]).contains("--alpha 5: must be none, or a return from -10000"));
     assert!(complaint(&["train", "--adversary-reward", "9;9"]).contains("must be none, or rewards as 9,9=-1"));
     let outside = complaint(&["train", "--adversary-reward", "10,0=1"]);
@@ -263,4 +263,192 @@ fn experiments_do_not_depend_on_the_number_of_cores() {
     assert_eq!(starts, ["0,1,-", "0,2,-", "0.2,1", "0.2,2", "0.4,1", "0.4,2"]);
     let made: Value = serde_json::from_str(&run(&table, "2")).unwrap();
     assert_eq!(made["runs"].as_array().unwrap().len(), 3 * 6);
+}
+
+/// A short sweep of nine runs.
+const SWEEP: [&str; 9] =
+    ["sweep", "--betas", "0:0.4:0.2", "--seeds", "3", "--total-steps", "30000", "--observer", "occupancy"];
+
+/// What a command says that goes well.
+fn said(arguments: &[&str]) -> String {
+    let output = ape(arguments);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8(output.stdout).unwrap()
+}
+
+/// The text of the file of a shard, computed anew.
+fn shard(which: &str, name: &str) -> String {
+    let path = file(name);
+    let _ = std::fs::remove_file(&path);
+    let line = said(&[&SWEEP[..], &["--shard", which, "--out", path.to_str().unwrap()]].concat());
+    assert!(line.contains(&format!("{name}: shard {which} is complete (runs: ")), "{line}");
+    std::fs::read_to_string(path).unwrap()
+}
+
+/// One shard, seven shards and no shards: the same table, JSON and CSV.
+#[test]
+fn merged_shards_are_the_sweep_byte_for_byte() {
+    let (whole, merged) = (file("whole.csv"), file("merged.csv"));
+    let table = said(&[&SWEEP[..], &["--out", whole.to_str().unwrap()]].concat());
+    let json = said(&[&SWEEP[..], &["--json"]].concat());
+    let csv = std::fs::read(&whole).unwrap();
+    assert_eq!(csv.iter().filter(|byte| **byte == b'\n').count(), 1 + 9);
+    for shards in [1, 7] {
+        // In no special order.
+        let names: Vec<String> = (1..=shards).rev().map(|i| format!("merged-{i}-of-{shards}.json")).collect();
+        for (i, name) in (1..=shards).rev().zip(&names) {
+            shard(&format!("{i}/{shards}"), name);
+        }
+        let paths: Vec<PathBuf> = names.iter().map(|name| file(name)).collect();
+        let mut merge = vec!["merge"];
+        merge.extend(paths.iter().map(|path| path.to_str().unwrap()));
+        let _ = std::fs::remove_file(&merged);
+        assert_eq!(said(&[&merge[..], &["-o", merged.to_str().unwrap()]].concat()), table);
+        assert_eq!(said(&[&merge[..], &["--json"]].concat()), json);
+        assert_eq!(std::fs::read(&merged).unwrap(), csv);
+    }
+}
+
+/// A shard whose file lacks runs, as a stop leaves it, ends up as one that was never stopped, on any number of cores;
+/// what is there already is kept.
+#[test]
+fn a_stopped_shard_goes_on() {
+    let name = "stopped.json";
+    let path = file(name);
+    let go_on = |cores: &str| {
+        let output = Command::new(env!("CARGO_BIN_EXE_ape"))
+            .args([&SWEEP[..], &["--shard", "1/2", "--out", path.to_str().unwrap()]].concat())
+            .env("RAYON_NUM_THREADS", cores)
+            .output()
+            .unwrap();
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        String::from_utf8(output.stdout).unwrap()
+    };
+    let whole = shard("1/2", name);
+    let parsed: Value = serde_json::from_str(&whole).unwrap();
+    assert_eq!((&parsed["complete"], parsed["runs"].as_array().unwrap().len()), (&json!(true), 5));
+    let kept = |which: &[usize]| {
+        let mut stopped = parsed.clone();
+        let runs = which.iter().map(|&run| parsed["runs"][run].clone());
+        stopped["runs"] = Value::Array(runs.collect());
+        stopped["complete"] = json!(false);
+        stopped
+    };
+    for (which, cores) in [(&[][..], "1"), (&[0], "3"), (&[1, 3], "2"), (&[0, 1, 2, 4], "1")] {
+        std::fs::write(&path, kept(which).to_string()).unwrap();
+        let line = complaint(&["merge", path.to_str().unwrap()]);
+        assert!(line.contains("shard 2/2 is missing"), "{line}");
+        assert!(go_on(cores).contains(&format!("(runs: 5, kept from before: {})", which.len())));
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), whole);
+    }
+    // A run that was done is not done again, and a complete file is not written again.
+    let mut marked = kept(&[2, 3]);
+    marked["runs"][1]["clone"]["success"] = json!(0.125);
+    std::fs::write(&path, marked.to_string()).unwrap();
+    go_on("2");
+    let gone_on: Value = serde_json::from_str(&std::fs::read_to_string(&path).unwrap()).unwrap();
+    assert_eq!(gone_on["runs"][3], marked["runs"][1]);
+    assert_eq!(gone_on["runs"][4], parsed["runs"][4]);
+    let pretty = serde_json::to_string_pretty(&gone_on).unwrap();
+    std::fs::write(&path, &pretty).unwrap();
+    assert!(go_on("2").contains("shard 1/2 is complete already (runs: 5), nothing to do"));
+    assert_eq!(std::fs::read_to_string(&path).unwrap(), pretty);
+}
+
+#[test]
+fn bad_shards_get_one_sentence_and_are_left_alone() {
+    let (first, second) = (file("bad-1.json"), file("bad-2.json"));
+    let (one, two) = (first.to_str().unwrap(), second.to_str().unwrap());
+    shard("1/2", "bad-1.json");
+    let whole = shard("2/2", "bad-2.json");
+    let good: Value = serde_json::from_str(&whole).unwrap();
+    let csv = file("bad.csv");
+    let merge = |files: &[&str]| {
+        let line = complaint(&[&["merge"], files, &["--out", csv.to_str().unwrap()]].concat());
+        assert!(!csv.exists());
+        line
+    };
+    let again = |extra: &[&str]| complaint(&[&SWEEP[..], &["--shard", "2/2", "--out", two], extra].concat());
+    let change = |pointer: &str, value: Value| {
+        let mut bad = good.clone();
+        *bad.pointer_mut(pointer).unwrap() = value;
+        bad.to_string().into_bytes()
+    };
+    let replace = |from: &str, to: &str| {
+        assert!(whole.contains(from), "{from}");
+        whole.replacen(from, to, 1).into_bytes()
+    };
+    let run = good["runs"][0].clone();
+    for (bytes, expected) in [
+        (whole.as_bytes()[..whole.len() / 2].to_vec(), "not a shard of a sweep: EOF"),
+        (Vec::new(), "not a shard of a sweep: EOF"),
+        (vec![0xff, 0xfe], "valid UTF-8"),
+        (b"[".repeat(100_000), "not a shard of a sweep: "),
+        (replace("\"success\":", "\"success\":NaN,\"s\":"), "not a shard of a sweep: expected value"),
+        (replace("\"success\":", "\"success\":1e999,\"s\":"), "not a shard of a sweep: number out of range"),
+        (change("/runs/0/ensemble/success", Value::Null), "not a shard of a sweep: invalid type: null"),
+        (change("/format", json!("ape-ensemble")), "format \"ape-ensemble\": must be \"ape-sweep-shard\""),
+        (change("/version", json!(2)), "version 2: this program reads version 1"),
+        (change("/shard", json!(0)), "0/2: must be I/K"),
+        (change("/shards", json!(0)), "2/0: must be I/K"),
+        (change("/shards", json!(10)), "2/10: the sweep has 9 runs, expected K from 1 to 9"),
+        (change("/sweep/seeds", json!(0)), "sweep.seeds has 0 entries: must have from 1 to 1000"),
+        (change("/sweep/betas", json!([])), "sweep.betas has 0 entries"),
+        (change("/sweep/betas/1", json!(3)), "config: beta 3: must be a number from 0 to 2"),
+        (change("/sweep/config/horizon", json!(0)), "config: horizon 0: must be"),
+        (change("/sweep/grid/rows", json!(99)), "grid: "),
+        (change("/runs/0/index", json!(2)), "run 2 (β 0, seed 2): expected a run of shard 2/2"),
+        (change("/runs/0/index", json!(90)), "the sweep has 9 runs"),
+        (change("/runs/0/seed", json!(1)), "expected β 0, seed 2 there"),
+        (change("/runs/1", run), "expected every run once"),
+        (change("/complete", json!(false)), "complete false: every run is there, expected true"),
+        (change("/runs", json!([])), "complete true: run 1 (β 0, seed 2), run 3"),
+    ] {
+        std::fs::write(&second, &bytes).unwrap();
+        for line in [merge(&[one, two]), again(&[])] {
+            assert!(line.contains("bad-2.json") && line.contains(expected), "{line}");
+        }
+        assert!(again(&[]).contains("; the file is left as it is"));
+        assert_eq!(std::fs::read(&second).unwrap(), bytes);
+    }
+    std::fs::File::create(&second).unwrap().set_len(200_000_000).unwrap();
+    assert!(merge(&[one, two]).contains("200000000 bytes: expected at most 100 MB"));
+    // Good files that are not what was asked for.
+    std::fs::write(&second, &whole).unwrap();
+    let line = again(&["--horizon", "90"]);
+    assert!(line.contains("bad-2.json: sweep.config.horizon 100: expected 90; the file is left as it is"), "{line}");
+    let line = complaint(&[&SWEEP[..], &["--shard", "1/2", "--out", two]].concat());
+    assert!(line.contains("bad-2.json: shard 2/2: expected shard 1/2; the file is left as it is"), "{line}");
+    assert_eq!(std::fs::read_to_string(&second).unwrap(), whole);
+    // Files that do not make a whole.
+    assert!(merge(&[two]).contains("shard 1/2 is missing: expected every shard of the sweep"));
+    assert!(merge(&[one, two, two]).contains("bad-2.json: given twice"));
+    let copy = file("bad-copy.json");
+    std::fs::copy(&first, &copy).unwrap();
+    let line = merge(&[one, two, copy.to_str().unwrap()]);
+    assert!(line.contains("bad-copy.json: shard 1/2, which is in ") && line.contains("bad-1.json too"), "{line}");
+    let line = {
+        std::fs::write(&second, change("/sweep/config/discount", json!(0.5))).unwrap();
+        merge(&[one, two])
+    };
+    assert!(line.contains("bad-2.json: sweep.config.discount 0.5: expected 0.99, as in "), "{line}");
+    assert!(merge(&["/no/such/file"]).contains("/no/such/file"));
+    assert!(complaint(&["merge"]).contains("<FILES>"));
+    // Flags; none of them leaves a file.
+    let out = file("bad-none.json");
+    let flags = |extra: &[&str]| {
+        let line = complaint(&[&SWEEP[..], &["--out", out.to_str().unwrap()], extra].concat());
+        assert!(!out.exists());
+        line
+    };
+    for bad in ["0/4", "5/4", "a/b", "4", "1/10001"] {
+        let line = flags(&["--shard", bad]);
+        assert!(line.contains(&format!("--shard {bad}: must be I/K, shard I of K, with I from 1 to K")), "{line}");
+    }
+    assert!(flags(&["--shard", "1/10"]).contains("--shard 1/10: the sweep has 9 runs, expected K from 1 to 9"));
+    assert!(flags(&["--shard", "1/2", "--json"]).contains("--json"));
+    assert!(flags(&["--shard", "1/2", "--config", "/no/such/file"]).contains("/no/such/file"));
+    assert!(complaint(&["sweep", "--shard", "1/2"]).contains("--shard 1/2: expected --out FILE with it"));
+    let price = complaint(&["sweep", "--preset", "price", "--shard", "1/2", "--out", out.to_str().unwrap()]);
+    assert!(price.contains("alpha -14: must be none where runs are compared") && !out.exists(), "{price}");
 }

@@ -1,5 +1,5 @@
 //! Experiments: what a run starts from, the presets, the course of a run; the attack bench, Table 1, the sweep
-//! over β and the race, each a list of independent tasks.
+//! over β, whole or in shards, and the race, each a list of independent tasks.
 
 pub mod address;
 mod baselines;
@@ -8,6 +8,7 @@ mod curve;
 mod presets;
 mod race;
 mod setup;
+mod shard;
 mod statistics;
 mod sweep;
 mod table1;
@@ -20,6 +21,7 @@ pub use curve::{CurvePoint, Denied};
 pub use presets::{PRESETS, Preset};
 pub use race::{Figures, Race, RaceError, Raced, Racer, Run};
 pub use setup::{Course, Setup, SetupError};
+pub use shard::{Difference, RunPlace, Shard, ShardError, ShardNumber, SweepPlan, merge_shards};
 pub use statistics::Summary;
 pub use sweep::{Sweep, SweepPoint, SweepRun};
 pub use table1::{MethodRun, Row, Table1};

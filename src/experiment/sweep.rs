@@ -79,10 +79,16 @@ impl Sweep {
         (0.3, PaperRow { ensemble: (-10.77, 0.68), clone: (-280.0, 106.62) }),
     ];
 
+    /// β and seed of the run with this index, from 0; `seeds` is at least 1.
+    pub fn place(betas: &[f64], seeds: u32, index: usize) -> (f64, u32) {
+        let seeds = seeds as usize;
+        (betas[index / seeds], (index % seeds) as u32 + 1)
+    }
+
     /// The setups of all β and seeds.
     pub fn setups(setup: &Setup, betas: &[f64], seeds: u32) -> Vec<Setup> {
-        let with = |beta, seed| Setup { config: Config { beta, seed, ..setup.config.clone() }, ..setup.clone() };
-        betas.iter().flat_map(|&beta| (1..=seeds).map(move |seed| with(beta, seed))).collect()
+        let with = |(beta, seed)| Setup { config: Config { beta, seed, ..setup.config.clone() }, ..setup.clone() };
+        (0..betas.len() * seeds as usize).map(|index| with(Sweep::place(betas, seeds, index))).collect()
     }
 
     /// β from `first` to `last` in steps of `step`, as `0:1:0.05`, or a list of them, as `0,0.1,0.6`.

@@ -13,10 +13,10 @@ use ape_lab::mdp::RETURN_KINDS;
 use clap::{Arg, ArgAction, ArgMatches, Command};
 use rayon::prelude::*;
 
-use super::{check_out, ensemble_file, print, setup, with_setup, write};
+use super::{check_out, ensemble_file, print, setup, shards, with_setup, write};
 
 /// Every command of this file.
-pub fn commands() -> [Command; 4] {
+pub fn commands() -> [Command; 5] {
     let attackers = || {
         Arg::new("attackers")
             .long("attackers")
@@ -25,7 +25,7 @@ pub fn commands() -> [Command; 4] {
             .help("Cloners with commas between, as uniform,bc(1000),history; or all")
     };
     let json = || Arg::new("json").long("json").action(ArgAction::SetTrue).help("Print JSON");
-    let out = |help: &'static str| Arg::new("out").long("out").value_name("FILE").help(help);
+    let out = |help: &'static str| Arg::new("out").short('o').long("out").value_name("FILE").help(help);
     let seeds = |default: &'static str| {
         Arg::new("seeds").long("seeds").value_name("N").default_value(default).help("Number of seeds, from 1 on")
     };
@@ -55,6 +55,21 @@ pub fn commands() -> [Command; 4] {
             )
             .arg(seeds("3"))
             .arg(json())
+            .arg(out("Write every run to this CSV file; with --shard, the shard to this JSON file"))
+            .arg(Arg::new("shard").long("shard").value_name("I/K").conflicts_with("json").help(
+                "Only the I-th of K shards of the runs, into a file of its own that ape merge joins with the others. \
+                 Run again after a stop, it goes on from that file",
+            )),
+        Command::new("merge")
+            .about("Join the shards of a sweep: prints and writes what ape sweep does of the whole")
+            .arg(
+                Arg::new("files")
+                    .value_name("FILES")
+                    .required(true)
+                    .num_args(1..)
+                    .help("The files of all shards, in any order"),
+            )
+            .arg(json())
             .arg(out("Write every run to this CSV file")),
         Command::new("results").about("Every table and picture of docs/RESULTS.md").arg(
             Arg::new("folder").value_name("FOLDER").default_value("docs").help("Where RESULTS.md and results/ go"),
@@ -64,6 +79,14 @@ pub fn commands() -> [Command; 4] {
 
 /// Runs tasks on all cores; outcomes come in the order of the tasks. Says on a terminal how far it is.
 pub fn run_all(tasks: &[Task]) -> Result<Vec<Outcome>, String> {
+    run_each(tasks, &|_, outcome| Ok(outcome))
+}
+
+/// The same; `keep` takes each outcome as it comes, with the place of its task, and what it makes of it is returned.
+pub fn run_each<T: Send>(
+    tasks: &[Task],
+    keep: &(impl Fn(usize, Outcome) -> Result<T, String> + Sync),
+) -> Result<Vec<T>, String> {
     let begin = Instant::now();
     let clock = || begin.elapsed().as_secs_f64() * 1000.0;
     let is_shown = std::io::stderr().is_terminal();
@@ -87,7 +110,7 @@ pub fn run_all(tasks: &[Task]) -> Result<Vec<Outcome>, String> {
         };
         let outcome = task.run(&clock, &mut progress)?;
         show(index, 1.0);
-        outcome.ok_or_else(|| "stopped".to_owned())
+        keep(index, outcome.ok_or_else(|| "stopped".to_owned())?)
     };
     let outcomes = tasks.par_iter().enumerate().map(run).collect();
     if is_shown {
@@ -248,12 +271,20 @@ pub fn sweep(matches: &ArgMatches) -> Result<(), String> {
     check_out(matches, "out")?;
     let betas = matches.get_one::<String>("betas").expect("it has a default");
     let betas = Sweep::betas(betas).map_err(|error| format!("--{error}"))?;
-    let sweep = make_sweep(&setup(matches)?, &betas, number(matches, "seeds", 1, 1000)?)?;
+    let (setup, seeds) = (setup(matches)?, number(matches, "seeds", 1, 1000)?);
+    if let Some(which) = matches.get_one::<String>("shard") {
+        return shards::sweep(matches, which, &setup, betas, seeds);
+    }
+    show_sweep(matches, &make_sweep(&setup, &betas, seeds)?)
+}
+
+/// Prints and writes a whole sweep as the flags say.
+pub fn show_sweep(matches: &ArgMatches, sweep: &Sweep) -> Result<(), String> {
     if let Some(file) = matches.get_one::<String>("out") {
         write(file, &sweep.csv())?;
     }
     if matches.get_flag("json") {
-        return print(&sweep);
+        return print(sweep);
     }
     for kind in [0, 2] {
         say!("{}, mean ± sd [95 % bootstrap interval] over seeds", RETURN_KINDS[kind].name);

@@ -1,5 +1,5 @@
 //! The command line: `ape evaluate`, `train`, `model` and `presets` here, `attack`, `table1`, `sweep` and `results` in
-//! `experiments`.
+//! `experiments`, `sweep --shard` and `merge` in `shards`.
 //!
 //! Results go to standard output. Bad input gets one line on standard error and exit code 2.
 
@@ -9,8 +9,10 @@ macro_rules! say {
 }
 
 mod experiments;
+mod shards;
 
-use std::io::Write;
+use std::fs::File;
+use std::io::{Read, Write};
 use std::path::Path;
 use std::process::ExitCode;
 
@@ -36,6 +38,7 @@ fn main() -> ExitCode {
         Some(("attack", matches)) => experiments::attack(matches),
         Some(("table1", matches)) => experiments::table1(matches),
         Some(("sweep", matches)) => experiments::sweep(matches),
+        Some(("merge", matches)) => shards::merge(matches),
         Some(("results", matches)) => experiments::results(matches),
         _ => presets(),
     };
@@ -62,11 +65,11 @@ fn command() -> Command {
     let file = |name: &'static str, help: &'static str| Arg::new(name).long(name).value_name("FILE").help(help);
     let train = Command::new("train")
         .about("Train an ensemble; prints its figures as JSON")
-        .arg(file("out", "Write the ensemble to this file"))
+        .arg(file("out", "Write the ensemble to this file").short('o'))
         .arg(file("curve", "Write the figures after every update to this CSV file"));
     let model = Command::new("model")
         .about("The transition model of a grid, for Python: states, actions, P, as Gymnasium has them")
-        .arg(file("out", "Write it to this file instead of standard output"));
+        .arg(file("out", "Write it to this file instead of standard output").short('o'));
     let fields = FIELDS.each_ref().map(|field| field.name);
     let mut command = Command::new("ape")
         .about("Adversarial policy ensembles: train them, evaluate them, attack them")
@@ -102,21 +105,33 @@ fn with_setup(command: Command, without: &[&str]) -> Command {
     })
 }
 
-/// The text of a file, which is no longer than an ensemble can be.
-fn read(file: &str) -> Result<String, String> {
+/// The text of a file of at most so many bytes.
+fn read(file: &str, longest: usize) -> Result<String, String> {
     let sentence = |error: std::io::Error| format!("{file}: {error}");
-    let length = std::fs::metadata(file).map_err(sentence)?.len();
-    if length > EnsembleFile::LONGEST as u64 {
-        return Err(format!("{file}: {length} bytes: expected at most {} MB", EnsembleFile::LONGEST / 1_000_000));
+    let opened = File::open(file).map_err(sentence)?;
+    let length = opened.metadata().map_err(sentence)?.len();
+    let longest = longest as u64;
+    let long = |length: u64| format!("{file}: {length} bytes: expected at most {} MB", longest / 1_000_000);
+    if length > longest {
+        return Err(long(length));
     }
-    std::fs::read_to_string(file).map_err(sentence)
+    // A device does not tell its length.
+    let mut text = String::new();
+    let read = opened.take(longest + 1).read_to_string(&mut text).map_err(sentence)? as u64;
+    if read > longest { Err(long(read)) } else { Ok(text) }
 }
 
-/// Writes a file whole or not at all.
+/// Writes a file whole or not at all, whoever else may be writing it.
 fn write(file: &str, text: &str) -> Result<(), String> {
-    let part = Path::new(file).with_added_extension("part");
-    let written = std::fs::write(&part, text).and_then(|()| std::fs::rename(&part, file));
-    written.map_err(|error| {
+    let part = Path::new(file).with_added_extension(format!("{}.part", std::process::id()));
+    let write_part = || {
+        let mut opened = File::create(&part)?;
+        opened.write_all(text.as_bytes())?;
+        // The name is to be taken by a file that is on the disk.
+        opened.sync_all()?;
+        std::fs::rename(&part, file)
+    };
+    write_part().map_err(|error| {
         // What could not be renamed is of no use to anyone.
         let _ = std::fs::remove_file(&part);
         format!("{file}: {error}")
@@ -151,7 +166,8 @@ fn print(result: &impl Serialize) -> Result<(), String> {
 fn ensemble_file(matches: &ArgMatches) -> Result<(Grid, Ensemble, u32), String> {
     let file = matches.get_one::<String>("file").expect("clap requires it");
     let in_file = |error| format!("{file}: {error}");
-    let parsed = EnsembleFile::parse(&read(file)?).map_err(|error| in_file(error.to_string()))?;
+    let parsed =
+        EnsembleFile::parse(&read(file, EnsembleFile::LONGEST)?).map_err(|error| in_file(error.to_string()))?;
     let horizon = parsed.config.as_ref().map_or(HORIZON, |config| config.horizon);
     if let Some(reason) = &parsed.left_out {
         eprintln!("ape: {file}: its config is not ours and left out, T is {HORIZON} ({reason})");
@@ -190,7 +206,9 @@ fn start(matches: &ArgMatches) -> Result<Setup, String> {
     let text = |name: &str| matches.get_one::<String>(name);
     match (text("preset"), text("config")) {
         (Some(_), Some(_)) => Err("--preset and --config: give one of them, both say where to start".to_owned()),
-        (None, Some(file)) => Setup::parse(&read(file)?).map_err(|error| format!("{file}: {error}")),
+        (None, Some(file)) => {
+            Setup::parse(&read(file, EnsembleFile::LONGEST)?).map_err(|error| format!("{file}: {error}"))
+        }
         (Some(name), None) => {
             let known = || PRESETS.iter().map(|preset| preset.name).collect::<Vec<_>>().join(", ");
             let preset = Preset::find(name).ok_or_else(|| format!("--preset {name}: must be one of {}", known()))?;
