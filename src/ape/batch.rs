@@ -313,3 +313,47 @@ impl Batch {
         (0..WALKERS).map(|i| self.rows.iter().map(move |row| row[i]).chain(self.tails[i].iter().copied()))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mdp::GridSpec;
+
+    /// Every walker goes through whole episodes, one expert to each, from a start to the goal or until time is over, whatever
+    /// the batch's size; a batch of many steps is shared by all of them.
+    #[test]
+    fn walkers_play_whole_episodes() {
+        let walls = vec![(1, 1), (2, 3)];
+        let grid = Grid::new(GridSpec { rows: 4, cols: 5, goal: (3, 0), walls, slip: 0.0 }).unwrap();
+        let (experts, horizon) = (3, 20);
+        let actions = vec![ActionDraw::new(&[0.2; ACTIONS]); experts * grid.cells()];
+        let course = Course::new(&grid, horizon, experts);
+        let mut luck = Luck::new(1);
+        let mut batch = Batch::default();
+        for (wanted, walkers) in [(1, 1), (79, 1), (80, 4), (5000, 4)] {
+            batch.play(&course, &EnsemblePlayer { actions: &actions }, wanted, &mut luck);
+            assert!((wanted as usize..(wanted + 4 * horizon) as usize).contains(&batch.steps()));
+            let (mut episodes, mut at_work) = (0, 0);
+            for walk in batch.walks() {
+                // Expert, where its action leads, and time of the step before; an episode's last leads nowhere.
+                let mut before: Option<(usize, usize, usize)> = None;
+                let mut walk = walk.peekable();
+                at_work += usize::from(walk.peek().is_some());
+                for step in walk {
+                    let (pair, action) = (step.entry() / ACTIONS, step.entry() % ACTIONS);
+                    let (expert, state) = (pair / grid.cells(), pair % grid.cells());
+                    match before {
+                        Some(before) => assert_eq!((before.0, before.1, before.2 + 1), (expert, state, step.time())),
+                        None => assert!(step.time() == 0 && grid.starts().contains(&(state as u32))),
+                    }
+                    let next = grid.next(state)[action] as usize;
+                    let is_last = next == grid.goal() || step.time() + 1 == horizon as usize;
+                    episodes += u32::from(is_last);
+                    before = (!is_last).then_some((expert, next, step.time()));
+                }
+                assert_eq!(before, None);
+            }
+            assert_eq!((batch.episodes(), at_work), (episodes, walkers));
+        }
+    }
+}
