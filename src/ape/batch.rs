@@ -199,19 +199,13 @@ impl Walker {
     }
 }
 
-/// Whole episodes, in the order in which each walker went through them. A copy is empty: what was played is of no more use.
+/// Whole episodes, in the order in which each walker went through them.
 #[derive(Default)]
 pub struct Batch {
     /// A row for each moment at which all walkers took a step.
     rows: Vec<[Step; WALKERS]>,
     /// What each walker still had to go then.
     tails: [Vec<Step>; WALKERS],
-}
-
-impl Clone for Batch {
-    fn clone(&self) -> Self {
-        Batch::default()
-    }
 }
 
 impl Batch {

@@ -17,6 +17,7 @@ mod pg_ape;
 mod recurrent;
 mod reward;
 mod softmax;
+mod tally;
 
 pub use adam::Adam;
 pub use algorithm::{Algorithm, Experts, Trainer};

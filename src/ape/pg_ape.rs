@@ -8,58 +8,31 @@
 //! of a batch but how often each (context, state, action) was taken and the sum of the returns that followed: a
 //! [`Tally`].
 
+use std::sync::Arc;
+
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::adam::Adam;
 use super::algorithm::{Algorithm, Experts};
-use super::batch::{Batch, ClonePlayer, Course, EnsemblePlayer, Luck, WALKERS};
+use super::batch::{Batch, ClonePlayer, Course, EnsemblePlayer, Luck};
 use super::observer::{Memory, Observer};
+use super::tally::{Rewards, Tally};
 use super::{AdversaryReward, BaselineKind, Config, Contexts, Ensemble, GradientKind, ReturnToGo};
 use crate::mdp::{ACTIONS, ActionDraw, Draw, Grid, Policy};
 
-/// A batch of episodes as far as learning needs it.
-#[derive(Clone)]
-struct Tally {
-    /// `[n][S][5]`: how often each action was taken, and the sum of the returns R(t) that followed.
-    entries: Vec<[f64; 2]>,
-    /// `[n][S]`: the same summed over actions.
-    pairs: Vec<[f64; 2]>,
-    episodes: f64,
-    steps: f64,
+/// What one update plays. The next begins anew, so that a copy of it is empty.
+#[derive(Default)]
+struct Played {
+    /// `[n][S]`.
+    actions: Vec<ActionDraw>,
+    batch: Batch,
+    ensemble_tally: Tally,
+    clone_tally: Tally,
 }
 
-impl Tally {
-    fn new(pairs: usize) -> Tally {
-        Tally { entries: vec![[0.0; 2]; pairs * ACTIONS], pairs: vec![[0.0; 2]; pairs], episodes: 0.0, steps: 0.0 }
-    }
-
-    /// `[n][S]`, the entries of each pair (context, state).
-    fn by_pair(&self) -> &[[[f64; 2]; ACTIONS]] {
-        self.entries.as_chunks().0
-    }
-
-    /// Counts a batch. `reward`: of an entry; `weights`: what the return after step t counts, `[T]`, where that is
-    /// not 1.
-    #[inline(always)]
-    fn count(&mut self, batch: &Batch, discount: f64, reward: impl Fn(usize) -> f64, weights: Option<&[f64]>) {
-        self.entries.fill([0.0; 2]);
-        // The return that follows each walker's step before this one; 0 after an episode's end.
-        let mut later = [0.0; WALKERS];
-        batch.backwards(|walker, step| {
-            let later = &mut later[walker];
-            let to_go = reward(step.entry()) + discount * *later;
-            let entry = &mut self.entries[step.entry()];
-            entry[0] += 1.0;
-            entry[1] += weights.map_or(to_go, |weights| weights[step.time()] * to_go);
-            let is_first = step.time() == 0;
-            // Without a branch, which would often be mistaken.
-            *later = f64::from_bits(to_go.to_bits() & u64::from(is_first).wrapping_sub(1));
-        });
-        self.episodes = f64::from(batch.episodes());
-        self.steps = batch.steps() as f64;
-        for (pair, actions) in self.pairs.iter_mut().zip(self.entries.as_chunks::<ACTIONS>().0) {
-            *pair = actions.iter().fold([0.0; 2], |sum, entry| [sum[0] + entry[0], sum[1] + entry[1]]);
-        }
+impl Clone for Played {
+    fn clone(&self) -> Self {
+        Played::default()
     }
 }
 
@@ -86,12 +59,8 @@ pub struct PgApe {
     /// r̃ by entry, `[n][S][5]`, where the clone's reward is not the experts'.
     adversary_reward: Option<Vec<f64>>,
     /// The grid, a copy for each expert, and that of the clone.
-    courses: [Course; 2],
-    /// What is played in; made anew in every update.
-    batch: Batch,
-    actions: Vec<ActionDraw>,
-    ensemble_tally: Tally,
-    clone_tally: Tally,
+    courses: Arc<[Course; 2]>,
+    played: Played,
 }
 
 impl PgApe {
@@ -113,11 +82,8 @@ impl PgApe {
             values_adam: Adam::new(values),
             weights,
             adversary_reward: config.adversary_reward.as_ref().map(by_entry),
-            courses: [experts, 1].map(|copies| Course::new(&grid, config.horizon, copies)),
-            batch: Batch::default(),
-            actions: Vec::new(),
-            ensemble_tally: Tally::new(pairs),
-            clone_tally: Tally::new(pairs),
+            courses: Arc::new([experts, 1].map(|copies| Course::new(&grid, config.horizon, copies))),
+            played: Played::default(),
             experts: Experts::new(grid, config, vec![0.0; pairs * ACTIONS]),
         }
     }
@@ -135,11 +101,12 @@ impl PgApe {
     /// Plays τ₁: an expert is drawn for an episode and acts for all of it.
     fn play_ensemble(&mut self, ensemble: &Ensemble) {
         let Config { batch_steps, discount, observer, .. } = self.experts.config;
-        self.actions.clear();
-        self.actions.extend(ensemble.policies().iter().flat_map(Policy::rows).map(|row| ActionDraw::new(row)));
-        let player = EnsemblePlayer { actions: &self.actions };
-        self.batch.play(&self.courses[0], &player, batch_steps, &mut self.luck);
-        count(&mut self.ensemble_tally, &self.batch, discount, None, self.weights.as_deref());
+        self.played.actions.clear();
+        self.played.actions.extend(ensemble.policies().iter().flat_map(Policy::rows).map(|row| ActionDraw::new(row)));
+        let player = EnsemblePlayer { actions: &self.played.actions };
+        self.played.batch.play(&self.courses[0], &player, batch_steps, &mut self.luck);
+        let rewards = Rewards { discount, by_entry: None, weights: self.weights.as_deref() };
+        self.played.ensemble_tally.count(self.experts.logits.len(), &self.played.batch, rewards);
         if observer.model().learns {
             self.show();
         }
@@ -149,7 +116,7 @@ impl PgApe {
     fn show(&mut self) {
         let cells = self.experts.grid.cells();
         let (mut context, mut states) = (0, Vec::new());
-        for walk in self.batch.walks() {
+        for walk in self.played.batch.walks() {
             for step in walk {
                 if step.time() == 0 && !states.is_empty() {
                     self.observer.saw(context, &states);
@@ -175,30 +142,37 @@ impl PgApe {
             (None, _) => self.play_blind::<{ Config::MAX_EXPERTS as usize - 1 }>(contexts),
         }
         let Config { discount, .. } = self.experts.config;
-        count(&mut self.clone_tally, &self.batch, discount, self.adversary_reward.as_deref(), self.weights.as_deref());
+        let rewards =
+            Rewards { discount, by_entry: self.adversary_reward.as_deref(), weights: self.weights.as_deref() };
+        self.played.clone_tally.count(self.experts.logits.len(), &self.played.batch, rewards);
     }
 
     fn play_blind<const ENDS: usize>(&mut self, contexts: &Contexts) {
         let draw = |state| Draw::new(contexts.row(state));
         let contexts: Vec<Draw<ENDS>> = (0..self.experts.grid.cells()).map(draw).collect();
-        let player = ClonePlayer { actions: &self.actions, contexts: &contexts };
-        self.batch.play(&self.courses[1], &player, self.experts.config.batch_steps, &mut self.luck);
+        let player = ClonePlayer { actions: &self.played.actions, contexts: &contexts };
+        self.played.batch.play(&self.courses[1], &player, self.experts.config.batch_steps, &mut self.luck);
     }
 
     fn play_remembering(&mut self, experts: usize, memory: &dyn Memory) {
-        let (actions, cells) = (&self.actions, self.experts.grid.cells());
+        let (actions, cells) = (&self.played.actions, self.experts.grid.cells());
         let mut remembered = Vec::new();
         let mut p = vec![0.0; experts];
-        self.batch.play_one(&self.courses[1], self.experts.config.batch_steps, &mut self.luck, |state, time, bits| {
-            if time == 0 {
-                remembered = memory.start();
-            }
-            memory.see(&mut remembered, state, &mut p);
-            let context = Draw::<{ Config::MAX_EXPERTS as usize - 1 }>::new(&p).outcome((bits >> 32) as u32);
-            let action = actions[context * cells + state].outcome(bits as u32);
-            memory.act(&mut remembered, state, action);
-            (context, action)
-        });
+        self.played.batch.play_one(
+            &self.courses[1],
+            self.experts.config.batch_steps,
+            &mut self.luck,
+            |state, time, bits| {
+                if time == 0 {
+                    remembered = memory.start();
+                }
+                memory.see(&mut remembered, state, &mut p);
+                let context = Draw::<{ Config::MAX_EXPERTS as usize - 1 }>::new(&p).outcome((bits >> 32) as u32);
+                let action = actions[context * cells + state].outcome(bits as u32);
+                memory.act(&mut remembered, state, action);
+                (context, action)
+            },
+        );
     }
 
     /// G₁ + G₂ (paper, Eqs. 5–7).
@@ -214,13 +188,13 @@ impl PgApe {
             }
         };
         // G₁ = 1/N₁ Σ ∇ log π_c(a|s) Ã(t), Ã(t) = R(t) − Ṽ_c(s).
-        let scale = 1.0 / self.ensemble_tally.episodes;
-        for ((score, tally), value) in scores.iter_mut().zip(self.ensemble_tally.by_pair()).zip(&self.values) {
+        let scale = 1.0 / self.played.ensemble_tally.episodes;
+        for ((score, tally), value) in scores.iter_mut().zip(self.played.ensemble_tally.by_pair()).zip(&self.values) {
             add(score, tally, scale, scale * value);
         }
         // G₂ = 1/N₂ Σ ∇ log π_o(a|s) Ã(t), Ã(t) = −βR(t) − Ṽ_o(s).
-        let tallies = self.clone_tally.by_pair();
-        let scale = 1.0 / self.clone_tally.episodes;
+        let tallies = self.played.clone_tally.by_pair();
+        let scale = 1.0 / self.played.clone_tally.episodes;
         let kind = self.experts.config.baseline;
         match self.experts.config.gradient {
             GradientKind::SampledContext => {
@@ -272,32 +246,22 @@ impl PgApe {
     /// −∇J(φ) (paper, Eq. 4): the way down the squared error of the baselines, per episode.
     fn value_gradient(&self) -> Vec<f64> {
         let Config { beta, value_weight, baseline, .. } = self.experts.config;
-        let (pairs, cells) = (self.ensemble_tally.pairs.len(), self.experts.grid.cells());
+        let (pairs, cells) = (self.played.ensemble_tally.pairs.len(), self.experts.grid.cells());
         let fit = |tally: &Tally, pair: usize, scale: f64, value: f64| {
             let [count, returns] = tally.pairs[pair];
             value_weight / tally.episodes * (scale * returns - count * value)
         };
         let mut gradient = vec![0.0; self.values.len()];
         for pair in 0..pairs {
-            gradient[pair] += fit(&self.ensemble_tally, pair, 1.0, self.values[pair]);
+            gradient[pair] += fit(&self.played.ensemble_tally, pair, 1.0, self.values[pair]);
             // A baseline of its own is fitted to R itself, so that β can change while it trains.
             let (index, scale) = match baseline {
                 BaselineKind::Joint => (pair, -beta),
                 BaselineKind::Separate => (pairs + pair % cells, 1.0),
             };
-            gradient[index] += fit(&self.clone_tally, pair, scale, self.values[index]);
+            gradient[index] += fit(&self.played.clone_tally, pair, scale, self.values[index]);
         }
         gradient
-    }
-}
-
-/// Counts a batch, of the experts' own reward or of another, each by a loop of its own.
-fn count(tally: &mut Tally, batch: &Batch, discount: f64, reward: Option<&[f64]>, weights: Option<&[f64]>) {
-    match (reward, weights) {
-        (None, None) => tally.count(batch, discount, |_| -1.0, None),
-        (None, weights) => tally.count(batch, discount, |_| -1.0, weights),
-        (Some(reward), None) => tally.count(batch, discount, |entry| reward[entry], None),
-        (Some(reward), weights) => tally.count(batch, discount, |entry| reward[entry], weights),
     }
 }
 
@@ -324,10 +288,8 @@ impl Algorithm for PgApe {
     }
 
     fn bytes(&self) -> usize {
-        // Numbers with two moments of Adam each, and two tallies.
-        3 * 8 * (self.experts.logits.len() + self.values.len())
-            + 2 * 16 * self.experts.logits.len()
-            + self.observer.bytes()
+        // Numbers with two moments of Adam each.
+        3 * 8 * (self.experts.logits.len() + self.values.len()) + self.observer.bytes()
     }
 
     fn boxed(&self) -> Box<dyn Algorithm> {
@@ -346,10 +308,10 @@ impl Algorithm for PgApe {
         let gradient = self.policy_gradient(&ensemble, &contexts);
         let value_gradient = self.value_gradient();
         let share = |tally: &Tally, pair: usize| tally.pairs[pair][0] / tally.steps;
-        let visited = |pair| share(&self.ensemble_tally, pair) + share(&self.clone_tally, pair);
+        let visited = |pair| share(&self.played.ensemble_tally, pair) + share(&self.played.clone_tally, pair);
         self.experts.ascend(&ensemble, gradient, self.experts.config.entropy_weight(self.experts.updates), visited);
         // 5: update of the value function, φ ← φ − α_φ ∇J(φ).
         self.values_adam.ascend(&mut self.values, &value_gradient, self.experts.config.learning_rate);
-        -self.ensemble_tally.steps / self.ensemble_tally.episodes
+        -self.played.ensemble_tally.steps / self.played.ensemble_tally.episodes
     }
 }
