@@ -11,7 +11,7 @@ use ape_lab::ape::observer::ObserverChoice;
 use ape_lab::ape::{AlgorithmKind, Config};
 use ape_lab::attack::AttackerChoice;
 use ape_lab::experiment::{Setup, Table1, Task};
-use ape_lab::mdp::{Grid, GridSpec, Solver};
+use ape_lab::mdp::{Grid, Solver};
 use criterion::measurement::WallTime;
 use criterion::{BatchSize, BenchmarkGroup, BenchmarkId, Criterion, SamplingMode, Throughput};
 use criterion::{criterion_group, criterion_main};
@@ -40,6 +40,7 @@ fn quick<'c>(criterion: &'c mut Criterion, name: &str) -> BenchmarkGroup<'c, Wal
 /// Whole runs, each with one thing changed; an element is an environment step (of the exact gradient: an update).
 fn training(criterion: &mut Criterion) {
     let mut group = slow(criterion, "training");
+    group.sample_size(20);
     for training in &TRAININGS {
         let setup = training.setup();
         group.throughput(Throughput::Elements(match setup.config.algorithm {
@@ -78,7 +79,7 @@ fn growth(criterion: &mut Criterion) {
 /// The four returns of a policy, and p(c|s) of the observers that have to compute it.
 fn exact(criterion: &mut Criterion) {
     let mut group = quick(criterion, "returns");
-    for side in SIDES.into_iter().chain([GridSpec::default().rows]) {
+    for side in SIDES.into_iter().chain([workload::side()]) {
         let setup = Setup { grid: workload::square(side), ..Setup::default() };
         let (grid, ensemble) = (workload::grid(&setup.grid), workload::experts(&setup));
         let mut solver = Solver::new(&grid);

@@ -63,6 +63,11 @@ pub fn square(side: u32) -> GridSpec {
     GridSpec { rows: side, cols: side, ..GridSpec::default() }
 }
 
+/// That of the paper's grid.
+pub fn side() -> u32 {
+    GridSpec::default().rows
+}
+
 /// Environment steps of a whole run: τ₁ and τ₂ of every update. Batches end with a whole episode, so that about one step in
 /// a hundred more is played than is counted here.
 pub fn steps(config: &Config) -> u64 {
