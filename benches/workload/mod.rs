@@ -11,7 +11,7 @@ use std::cell::Cell;
 use ape_lab::ape::observer::ObserverChoice;
 use ape_lab::ape::{AlgorithmKind, BaselineKind, Config, Ensemble, GradientKind, Trainer};
 use ape_lab::attack::{AttackerChoice, Target};
-use ape_lab::experiment::Setup;
+use ape_lab::experiment::{PRESETS, Setup};
 use ape_lab::lab::{Command, Event, RunState, Session, encode};
 use ape_lab::mdp::{Grid, GridSpec};
 
@@ -31,7 +31,10 @@ pub const TRAININGS: [Training; 10] = [
     Training { name: "experts-8", change: |setup| setup.config.experts = Config::MAX_EXPERTS },
     Training {
         name: "adversary-reward",
-        change: |setup| setup.config.adversary_reward = Some("0,9=-1".parse().expect("as the preset has it")),
+        change: |setup| {
+            let preset = PRESETS.iter().find(|preset| preset.name == "lure").expect("it is in the table");
+            setup.config.adversary_reward = (preset.setup)().config.adversary_reward;
+        },
     },
     Training { name: "slip", change: |setup| setup.grid.slip = 0.1 },
     Training { name: "history", change: |setup| setup.config.observer = "history".parse().expect("it is a model") },
