@@ -25,6 +25,11 @@ pub fn cores() -> usize {
     std::thread::available_parallelism().map_or(1, usize::from)
 }
 
+/// How many programs want a processor, as a mean over the last minute.
+pub fn load() -> Option<f64> {
+    std::fs::read_to_string("/proc/loadavg").ok()?.split_whitespace().next()?.parse().ok()
+}
+
 /// The version of a program as it tells it, without its name.
 pub fn version(program: &str) -> String {
     let said = tools::output(program, &["--version"]).unwrap_or_default();

@@ -32,6 +32,9 @@ pub const PARTS: [Part; 4] = [
     Part { name: "peers", file: "peers.json", is_usual: false, measure: peers::measure },
 ];
 
+/// A load from which on times mean little.
+const BUSY: f64 = 1.0;
+
 /// Measures the named parts, or the usual ones; `document` only writes the document anew. A part that fails does not keep
 /// the others from being measured.
 pub fn bench(names: &[&str]) -> Result<(), Failure> {
@@ -40,6 +43,11 @@ pub fn bench(names: &[&str]) -> Result<(), Failure> {
         let known: Vec<&str> = PARTS.iter().map(|part| part.name).collect();
         return Err(format!("nothing to measure is called {unknown}; there are: {}, document", known.join(", ")));
     }
+    // Once: what is measured first is a load of its own.
+    let load = environment::load();
+    if let Some(load) = load.filter(|load| *load > BUSY && names != ["document"]) {
+        println!("this machine has other work to do (load {load}): times will come out too long");
+    }
     let mut failures = Vec::new();
     for part in PARTS {
         let is_wanted = if names.is_empty() { part.is_usual } else { names.contains(&part.name) };
@@ -47,7 +55,9 @@ pub fn bench(names: &[&str]) -> Result<(), Failure> {
             continue;
         }
         match (part.measure)() {
-            Ok(figures) => {
+            Ok(mut figures) => {
+                figures["environment"]["load before"] =
+                    load.map_or("unknown".to_owned(), |load| load.to_string()).into();
                 let text = serde_json::to_string_pretty(&figures).map_err(|error| error.to_string())?;
                 write(&root().join(relative(part.name)), &(text + "\n"))?;
             }
