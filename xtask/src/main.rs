@@ -1,10 +1,11 @@
-//! The commands of this repository: `cargo xtask serve`, `build`, `test`, `results`, `tools`, `offline`.
+//! The commands of this repository: `cargo xtask serve`, `build`, `test`, `results`, `bench`, `tools`, `offline`.
 //!
 //! Everything a command needs and does not find, it installs first, saying what it does and how long
 //! that takes. `tools` says what is needed and gets it, `steps` runs one command after another and sums
-//! up, `offline` lists the page's files for its service worker. Little but the standard library is used, so
+//! up, `bench` measures, `offline` lists the page's files for its service worker. Little but the standard library is used, so
 //! that this program itself builds in a moment.
 
+mod bench;
 mod offline;
 mod steps;
 mod tools;
@@ -24,6 +25,9 @@ usage: cargo xtask COMMAND
   build              the same page made small for publishing, in dist/
   test [STEP ...]    install what tests need, run everything (or the named steps), sum up
   results            make docs/RESULTS.md and its pictures anew (2 to 3 minutes on two cores)
+  bench [PART ...]   measure native, counts and browser, or the named parts; write docs/PERFORMANCE.md.
+                     Parts: native (3 minutes), counts (1), browser, peers (JAX and PyTorch beside it),
+                     and document, which measures nothing
   tools              only install what the other commands need
   offline [FOLDER]   write the service worker of a built page (trunk runs this after each build)
 ";
@@ -39,6 +43,7 @@ fn main() -> ExitCode {
         Some("build") => build(),
         Some("test") => test(&rest),
         Some("results") => results(),
+        Some("bench") => bench::bench(&rest),
         Some("tools") => tools::install(&tools::ALL),
         Some("offline") => offline(&rest),
         Some("help" | "--help" | "-h") => {

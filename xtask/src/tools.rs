@@ -25,6 +25,8 @@ pub enum Tool {
     Chromium,
     Node,
     NodePackages,
+    Valgrind,
+    Python,
 }
 
 /// What building and serving the page needs.
@@ -50,6 +52,9 @@ pub fn install(tools: &[Tool]) -> Result<(), Failure> {
         Tool::Chromium => chromium_and_driver(),
         Tool::Node => node(),
         Tool::NodePackages => npm_ci("tests/e2e"),
+        Tool::Valgrind if find("valgrind").is_some() => Ok(()),
+        Tool::Valgrind => apt(&["valgrind"], "counting instructions needs valgrind"),
+        Tool::Python => python(),
     })
 }
 
@@ -72,7 +77,7 @@ fn find(name: &str) -> Option<PathBuf> {
 }
 
 /// What a program prints, or nothing when it cannot be run.
-fn output(name: &str, arguments: &[&str]) -> Option<String> {
+pub fn output(name: &str, arguments: &[&str]) -> Option<String> {
     let output = program(name, arguments).stderr(Stdio::null()).output().ok()?;
     output.status.success().then(|| String::from_utf8_lossy(&output.stdout).trim().to_owned())
 }
@@ -197,6 +202,14 @@ fn node() -> Result<(), Failure> {
         return Ok(());
     }
     apt(&["nodejs", "npm"], "the browser tests need Node.js 18 or later and npm")
+}
+
+/// Python with what makes virtual environments: Debian has that in a package of its own.
+fn python() -> Result<(), Failure> {
+    if output("python3", &["-c", "import ensurepip, venv"]).is_some() {
+        return Ok(());
+    }
+    apt(&["python3", "python3-venv"], "the peers need Python 3 and its module venv")
 }
 
 /// Node packages as a lock file names them, installed again when the lock file changed.
