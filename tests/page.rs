@@ -71,7 +71,7 @@ impl Hand for AtOnce {
     fn begin(&mut self, task: &Task) {
         self.0.push_back(TaskEvent::Progress(0.5));
         self.0.push_back(match task.run(&|| 0.0, &mut |_| true) {
-            Ok(outcome) => TaskEvent::Done(Box::new(outcome.expect("it was not told to stop"))),
+            Ok(outcome) => TaskEvent::Done(Box::new(outcome.expect("it was not told to stop")), 1.0),
             Err(sentence) => TaskEvent::Failed(sentence),
         });
     }

@@ -340,7 +340,7 @@ fn a_pool_does_every_task_once() {
     while outcomes.len() < 5 {
         for (id, event) in pool.receive() {
             match event {
-                TaskEvent::Done(outcome) => outcomes.push((id, *outcome)),
+                TaskEvent::Done(outcome, _) => outcomes.push((id, *outcome)),
                 TaskEvent::Failed(sentence) => panic!("{sentence}"),
                 _ => {}
             }

@@ -83,7 +83,8 @@ pub enum TaskEvent {
     Ready,
     /// How much of it is done, 0..=1.
     Progress(f32),
-    Done(Box<Outcome>),
+    /// And how many milliseconds of work it was.
+    Done(Box<Outcome>, f64),
     /// It could not be done; the sentence says why.
     Failed(String),
 }

@@ -133,7 +133,7 @@ impl Hand for ThreadHand {
                 is_heard && !is_stopped.load(Ordering::Relaxed)
             };
             let _ = match task.run(&clock, &mut progress) {
-                Ok(Some(outcome)) => sender.send(TaskEvent::Done(Box::new(outcome))),
+                Ok(Some(outcome)) => sender.send(TaskEvent::Done(Box::new(outcome), clock())),
                 Ok(None) => Ok(()),
                 Err(sentence) => sender.send(TaskEvent::Failed(sentence)),
             };

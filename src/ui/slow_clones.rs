@@ -57,7 +57,7 @@ impl App {
                 self.slow_clones.making.remove(index);
                 self.notice = Some(sentence);
             }
-            TaskEvent::Done(outcome) => {
+            TaskEvent::Done(outcome, _) => {
                 let (_, moment, cloner) = self.slow_clones.making.remove(index);
                 if let Outcome::Attack(_, cloned) = *outcome {
                     self.slow_clones.made.push((moment, CloneView::new(cloner, &cloned)));

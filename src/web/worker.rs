@@ -202,7 +202,8 @@ fn do_tasks(scope: DedicatedWorkerGlobalScope) {
         let scope = &scope;
         let now = || clock.now();
         // News of progress at most twenty times a second.
-        let told = Cell::new(now());
+        let begun = now();
+        let told = Cell::new(begun);
         let mut progress = |done: f64| {
             if now() - told.get() > 50.0 {
                 told.set(now());
@@ -213,7 +214,7 @@ fn do_tasks(scope: DedicatedWorkerGlobalScope) {
         let task: Result<Task, String> = decode(&Uint8Array::new(&message.data()).to_vec());
         let outcome = task.and_then(|task| task.run(&now, &mut progress));
         match outcome {
-            Ok(Some(outcome)) => post(scope, &TaskEvent::Done(Box::new(outcome))),
+            Ok(Some(outcome)) => post(scope, &TaskEvent::Done(Box::new(outcome), now() - begun)),
             Ok(None) => {}
             Err(sentence) => post(scope, &TaskEvent::Failed(sentence)),
         }

@@ -26,6 +26,8 @@ pub struct Batch {
     begun: f64,
     ended: Option<f64>,
     failure: Option<String>,
+    /// Seconds that the workers have worked in all.
+    work: f64,
 }
 
 impl Batch {
@@ -34,7 +36,7 @@ impl Batch {
         let ended = tasks.is_empty().then_some(now);
         let outcomes = tasks.iter().map(|_| None).collect();
         let tasks = tasks.into_iter().map(|task| (pool.begin(task), 0.0)).collect();
-        Batch { tasks, outcomes, begun: now, ended, failure: None }
+        Batch { tasks, outcomes, begun: now, ended, failure: None, work: 0.0 }
     }
 
     /// Takes in news of one of its tasks; of others none.
@@ -42,7 +44,8 @@ impl Batch {
         let Some(index) = self.tasks.iter().position(|(task, _)| *task == id) else { return };
         match event {
             TaskEvent::Progress(part) => self.tasks[index].1 = *part,
-            TaskEvent::Done(outcome) => {
+            TaskEvent::Done(outcome, ms) => {
+                self.work += ms / 1000.0;
                 self.tasks[index].1 = 1.0;
                 self.outcomes[index] = Some((**outcome).clone());
             }
@@ -75,6 +78,14 @@ impl Batch {
         self.ended = Some(now);
     }
 
+    /// What several workers have gained.
+    fn speed_up(&self, workers: usize, seconds: f64) -> String {
+        if workers < 2 || self.tasks.len() < 2 || seconds < 0.5 {
+            return String::new();
+        }
+        format!(": {:.1} s of work by {workers} workers, {:.1} times as fast as one", self.work, self.work / seconds)
+    }
+
     /// How far it is, with an estimate and a button that cancels; in the end how long it took.
     pub fn show(&mut self, ui: &mut Ui, pool: &mut Pool) {
         let palette = Palette::of(ui);
@@ -86,7 +97,7 @@ impl Batch {
         if let Some(ended) = self.ended {
             let seconds = ended - self.begun;
             let text = match self.outcomes.iter().flatten().count() {
-                _ if self.is_complete() => format!("done in {seconds:.1} s"),
+                _ if self.is_complete() => format!("done in {seconds:.1} s{}", self.speed_up(pool.size(), seconds)),
                 count => format!("stopped after {seconds:.1} s with {count} of {} done", self.tasks.len()),
             };
             status(ui, &text, Live::Polite);
