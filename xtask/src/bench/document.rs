@@ -16,8 +16,8 @@ const MISSING: &str = "not measured yet";
 #[derive(Clone, Copy)]
 enum Goal {
     AtMost(f64),
-    /// At least so many for each core.
-    PerCore(f64),
+    /// At most so many times what the default run takes.
+    Times(f64),
 }
 
 /// Where a line's figure comes from: rows of the part `native`.
@@ -38,38 +38,65 @@ struct Line {
     goal: Option<Goal>,
 }
 
+/// The run that others are compared with.
+const DEFAULT: &str = "training/default";
+
 /// What is told of the part `native`, and what is wanted of it.
 const LINES: [Line; 20] = [
     Line {
         what: "A whole run: 732 updates, two experts (the default)",
-        from: From::Time("training/default", "step"),
-        goal: None,
+        from: From::Time(DEFAULT, "step"),
+        goal: Some(Goal::AtMost(30.0)),
     },
     Line { what: "… with one joint baseline", from: From::Time("training/joint", "step"), goal: None },
-    Line { what: "… against `replay(60)`", from: From::Time("training/replay", "step"), goal: None },
-    Line { what: "… against `occupancy`", from: From::Time("training/occupancy", "step"), goal: None },
+    Line {
+        what: "… against `replay(60)`", from: From::Time("training/replay", "step"), goal: Some(Goal::Times(2.0))
+    },
+    Line {
+        what: "… against `occupancy`",
+        from: From::Time("training/occupancy", "step"),
+        goal: Some(Goal::Times(2.0)),
+    },
     Line { what: "… against `history`", from: From::Time("training/history", "step"), goal: None },
-    Line { what: "… with the gradient `mixture`", from: From::Time("training/mixture", "step"), goal: None },
-    Line { what: "… with eight experts", from: From::Time("training/experts-8", "step"), goal: None },
+    Line {
+        what: "… with the gradient `mixture`",
+        from: From::Time("training/mixture", "step"),
+        goal: Some(Goal::Times(2.0)),
+    },
+    Line {
+        what: "… with eight experts", from: From::Time("training/experts-8", "step"), goal: Some(Goal::Times(2.0))
+    },
     Line {
         what: "… with another reward for the clone",
         from: From::Time("training/adversary-reward", "step"),
-        goal: None,
+        goal: Some(Goal::Times(2.0)),
     },
     Line { what: "… on a slippery grid", from: From::Time("training/slip", "step"), goal: None },
-    Line { what: "A whole run of exact APE: 1,500 updates", from: From::Time("training/exact", "update"), goal: None },
-    Line { what: "The four returns of a policy, 10 × 10", from: From::Time("returns/100", ""), goal: None },
-    Line { what: "The four returns of a policy, 32 × 32", from: From::Time("returns/1024", ""), goal: None },
+    Line {
+        what: "A whole run of exact APE: 1,500 updates",
+        from: From::Time("training/exact", "update"),
+        goal: Some(Goal::AtMost(250.0)),
+    },
+    Line {
+        what: "The four returns of a policy, 10 × 10",
+        from: From::Time("returns/100", ""),
+        goal: Some(Goal::AtMost(0.06)),
+    },
+    Line {
+        what: "The four returns of a policy, 32 × 32",
+        from: From::Time("returns/1024", ""),
+        goal: Some(Goal::AtMost(3.0)),
+    },
     Line { what: "p(c\\|s) of `occupancy`", from: From::Time("contexts/occupancy", ""), goal: None },
     Line {
         what: "`bc(1000000)`: drawing a million pairs, 100 epochs, exact returns",
         from: From::Time("cloning/bc(1000000)", "pair"),
-        goal: None,
+        goal: Some(Goal::AtMost(800.0)),
     },
     Line {
         what: "`bc_counts(1000000)`: drawing a million pairs, counting, exact returns",
         from: From::Time("cloning/bc_counts(1000000)", "pair"),
-        goal: None,
+        goal: Some(Goal::AtMost(15.0)),
     },
     Line {
         what: "`bc(1000000)` without drawing: the one less the other",
@@ -87,11 +114,7 @@ const LINES: [Line; 20] = [
         goal: None,
     },
     Line { what: "A snapshot for the page: its size", from: From::Bytes("snapshot/default"), goal: None },
-    Line {
-        what: "A sweep on all cores, compared with one",
-        from: From::Ratio("parallel"),
-        goal: Some(Goal::PerCore(0.85)),
-    },
+    Line { what: "A sweep on all cores, compared with one", from: From::Ratio("parallel"), goal: None },
 ];
 
 /// Reads a part's figures, where there are any.
@@ -217,14 +240,15 @@ fn native_line(line: &Line, native: &Value) -> Option<Shown> {
             (value, "×", Shown { figure, spread, note, ..shown })
         }
     };
-    Some(Shown { goal: line.goal.map_or_else(Default::default, |goal| judged(goal, value, unit, cores)), ..shown })
+    let default = find(DEFAULT).and_then(|row| number(row, "value")).unwrap_or(f64::NAN) / 1e6;
+    Some(Shown { goal: line.goal.map_or_else(Default::default, |goal| judged(goal, value, unit, default)), ..shown })
 }
 
 /// A goal in words, and whether it is met.
-fn judged(goal: Goal, value: f64, unit: &str, cores: f64) -> (String, String) {
+fn judged(goal: Goal, value: f64, unit: &str, default: f64) -> (String, String) {
     let (text, is_met) = match goal {
         Goal::AtMost(most) => (format!("≤ {most} {unit}"), value <= most),
-        Goal::PerCore(least) => (format!("≥ {} {unit}", rounded(least * cores, 2)), value >= least * cores),
+        Goal::Times(most) => (format!("≤ {most} × the default"), value <= most * default),
     };
     (text, if is_met { "yes" } else { "**no**" }.to_owned())
 }
@@ -241,7 +265,7 @@ fn browser_line(row: &Value) -> Option<Shown> {
         _ => (format!("{} {unit}", grouped(low)), format!("{} – {} {unit}", grouped(low), grouped(high))),
     };
     let (goal, met) =
-        row["goal"].as_f64().map_or_else(Default::default, |most| judged(Goal::AtMost(most), value, &unit, 1.0));
+        row["goal"].as_f64().map_or_else(Default::default, |most| judged(Goal::AtMost(most), value, &unit, f64::NAN));
     let goal = row["goal_text"].as_str().map_or(goal, str::to_owned);
     let figure = match text("figure").as_str() {
         "" | "median" => String::new(),
@@ -346,8 +370,8 @@ mod tests {
 
     #[test]
     fn goals_are_judged() {
-        assert_eq!(judged(Goal::AtMost(45.0), 44.0, "ms", 1.0), ("≤ 45 ms".to_owned(), "yes".to_owned()));
-        assert_eq!(judged(Goal::PerCore(0.85), 1.6, "×", 2.0), ("≥ 1.7 ×".to_owned(), "**no**".to_owned()));
+        assert_eq!(judged(Goal::AtMost(45.0), 44.0, "ms", 30.0), ("≤ 45 ms".to_owned(), "yes".to_owned()));
+        assert_eq!(judged(Goal::Times(2.0), 61.0, "ms", 30.0), ("≤ 2 × the default".to_owned(), "**no**".to_owned()));
         let row = json!({ "name": "First picture", "unit": "ms", "goal": 1500, "goal_text": null, "samples": [900, 1700],
             "figure": "p95", "value": 1700.0, "note": "cold" });
         let shown = browser_line(&row).unwrap();
