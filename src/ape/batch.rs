@@ -71,8 +71,9 @@ impl Course {
     /// Where an episode begins: any copy, any start. Not often, so it is kept out of the way.
     #[cold]
     #[inline(never)]
-    fn start(&self, rng: &mut impl Rng) -> usize {
-        let bits = rng.next_u64();
+    fn start(&self, starts: &mut Starts<impl Rng>) -> usize {
+        starts.drawn = starts.drawn.wrapping_add(1);
+        let bits = starts.rng.next_u64();
         let copy = one_of(self.next.len() / self.cells, (bits >> 32) as u32);
         copy * self.cells + self.starts[one_of(self.starts.len(), bits as u32)] as usize
     }
@@ -94,16 +95,23 @@ impl Course {
 #[derive(Clone)]
 pub struct Luck<R> {
     steps: R,
-    starts: R,
+    starts: Starts<R>,
+}
+
+/// A generator that counts.
+#[derive(Clone)]
+struct Starts<R> {
+    rng: R,
+    drawn: u32,
 }
 
 impl Luck<Xoshiro256PlusPlus> {
     pub fn new(seed: u32) -> Self {
         let steps = Xoshiro256PlusPlus::seed_from_u64(u64::from(seed));
-        let mut starts = steps.clone();
+        let mut rng = steps.clone();
         // 2¹²⁸ draws ahead.
-        starts.jump();
-        Luck { steps, starts }
+        rng.jump();
+        Luck { steps, starts: Starts { rng, drawn: 0 } }
     }
 }
 
@@ -185,7 +193,7 @@ impl Walker {
         player: &impl Player,
         bits: u64,
         steps: &mut impl Rng,
-        starts: &mut impl Rng,
+        starts: &mut Starts<impl Rng>,
     ) -> Step {
         let (pair, action) = player.act(self.place, bits);
         let step = Step((pair * ACTIONS + action) as u32 + self.clock);
@@ -206,18 +214,13 @@ pub struct Batch {
     rows: Vec<[Step; WALKERS]>,
     /// What each walker still had to go then.
     tails: [Vec<Step>; WALKERS],
+    pub episodes: u32,
 }
 
 impl Batch {
     /// Steps played.
     pub fn steps(&self) -> usize {
         WALKERS * self.rows.len() + self.tails.iter().map(Vec::len).sum::<usize>()
-    }
-
-    /// Episodes played.
-    pub fn episodes(&self) -> u32 {
-        let begun = |steps: &[Step]| steps.iter().map(|step| u32::from(step.0 < Step::TICK)).sum::<u32>();
-        begun(self.rows.as_flattened()) + self.tails.iter().map(|tail| begun(tail)).sum::<u32>()
     }
 
     /// Plays whole episodes of at least `wanted` steps in all. Where that is little for four walkers, who may each
@@ -241,6 +244,7 @@ impl Batch {
         let is_much = wanted / WALKERS as u32 >= course.end / Step::TICK;
         let rounds = if is_much { wanted.div_ceil(WALKERS as u32) as usize } else { 0 };
         self.rows.resize(rounds, [Step::default(); WALKERS]);
+        let before = luck.starts.drawn;
         let [mut a, mut b, mut c, mut d] = [(); WALKERS].map(|()| Walker::begin(course, luck));
         // A copy close at hand, which stays in registers.
         let mut steps = luck.steps.clone();
@@ -265,6 +269,8 @@ impl Batch {
                 played += 1;
             }
         }
+        // In the end each stands at a start that was drawn in vain.
+        self.episodes = luck.starts.drawn.wrapping_sub(before) - WALKERS as u32;
     }
 
     /// Plays as a clone that remembers its episode; `act` chooses context and action at (state, time) by 64 random bits.
@@ -277,6 +283,7 @@ impl Batch {
     ) {
         self.rows.clear();
         self.tails.iter_mut().for_each(Vec::clear);
+        let before = luck.starts.drawn;
         let tail = &mut self.tails[0];
         let mut walker = Walker::begin(course, luck);
         while walker.clock > 0 || tail.len() < wanted as usize {
@@ -289,6 +296,7 @@ impl Batch {
                 walker.step::<false>(course, &player, 0, &mut luck.steps, &mut luck.starts)
             });
         }
+        self.episodes = luck.starts.drawn.wrapping_sub(before) - 1;
     }
 
     /// Visits every step, each episode from its last to its first; `visit` gets the walker's number too.
@@ -347,7 +355,7 @@ mod tests {
                 }
                 assert_eq!(before, None);
             }
-            assert_eq!((batch.episodes(), at_work), (episodes, walkers));
+            assert_eq!((batch.episodes, at_work), (episodes, walkers));
         }
     }
 }

@@ -40,7 +40,7 @@ impl Tally {
             (Some(reward), None) => self.add(batch, discount, |entry| reward[entry], |_| 1.0),
             (Some(reward), Some(weights)) => self.add(batch, discount, |entry| reward[entry], |t| weights[t]),
         }
-        self.episodes = f64::from(batch.episodes());
+        self.episodes = f64::from(batch.episodes);
         self.steps = batch.steps() as f64;
         let sum = |actions: &[[f64; 2]; ACTIONS]| {
             actions.iter().fold([0.0; 2], |sum, entry| [sum[0] + entry[0], sum[1] + entry[1]])
