@@ -786,7 +786,7 @@ fn an_address_brings_everything_back() {
     page.get_by(|node| {
         node.role() == Role::Status && says(node).is_some_and(|text| text.contains(&format!("update {at} of 732")))
     });
-    let fragment = "v=1&size=6x7&goal=2,3&walls=0:0-1;4:5&beta=0.4&seed=9&turns=100:0.2&tab=world&return=success&clones=occupancy&cell=1,2&at=321";
+    let fragment = "v=1&size=6x7&goal=2,3&walls=0:0-1;4:5&beta=0.4&seed=9&turns=100:0.2&tab=world&return=success&speed=1500&clones=occupancy&cell=1,2&at=321";
     first.visits.borrow_mut().push(fragment.to_owned());
     let (mut page, _) = open_with(1280.0, 800.0, first.clone());
     until(&mut page, "paused at update 321 of 732");

@@ -3,11 +3,11 @@
 use egui::Context;
 
 use super::app::{App, Promise, TABS, View};
-use super::lesson;
+use super::{lesson, toolbar};
 use crate::attack::AttackerChoice;
 use crate::experiment::address::{AddressError, Pairs, bad, decode, encode, finish, read, read_cell, take, write};
 use crate::experiment::{PRESETS, Setup};
-use crate::lab::RunState;
+use crate::lab::{Command, RunState};
 use crate::mdp::{Grid, RETURN_KINDS};
 
 /// Least time between two changes of the address, in seconds: browsers refuse more.
@@ -39,6 +39,9 @@ impl App {
         }
         if view.kind > 0 {
             put("return", RETURN_KINDS[view.kind].name.to_owned());
+        }
+        if view.speed != toolbar::DEFAULT_SPEED {
+            put("speed", written_speed(view.speed));
         }
         if view.clones != App::usual_clones(setup.config.observer) {
             put("clones", view.clones.iter().map(AttackerChoice::to_string).collect::<Vec<_>>().join(";"));
@@ -136,7 +139,14 @@ impl App {
         // Where no more is said than which step, the step sets its own stage.
         let is_staged = pairs.iter().any(|(name, _)| name != "tab" && name != "step");
         let setup = read(&mut pairs)?;
-        let mut view = View { cell: None, kind: 0, step: 0, tab: super::app::Tab::Train, ..self.view.clone() };
+        let mut view = View {
+            cell: None,
+            kind: 0,
+            step: 0,
+            tab: super::app::Tab::Train,
+            speed: toolbar::DEFAULT_SPEED,
+            ..self.view.clone()
+        };
         let mut clones = App::usual_clones(setup.config.observer);
         read_view(&mut pairs, &setup, &mut view, &mut clones)?;
         let promise = read_promise(&mut pairs, &setup)?;
@@ -145,10 +155,16 @@ impl App {
         self.begin(setup, preset);
         view.staged = is_staged.then_some(view.step);
         self.view = view;
+        self.send(Command::Speed(toolbar::SPEEDS[self.view.speed]));
         self.show_clones(clones);
         self.promise = Some(promise).filter(|promise| *promise != Promise { update: None, digest: None });
         Ok(file)
     }
+}
+
+/// Updates per second; `max` is as fast as it goes.
+fn written_speed(speed: usize) -> String {
+    toolbar::SPEEDS[speed].map_or("max".to_owned(), |speed| speed.to_string())
 }
 
 fn read_view(
@@ -176,6 +192,13 @@ fn read_view(
             return bad("return", &value, &format!("one of {}", names.join(", ")));
         };
         view.kind = kind;
+    }
+    if let Some(value) = take(pairs, "speed") {
+        let written: Vec<String> = (0..toolbar::SPEEDS.len()).map(written_speed).collect();
+        match written.iter().position(|speed| *speed == value) {
+            Some(speed) => view.speed = speed,
+            None => return bad("speed", &value, &format!("one of {}", written.join(", "))),
+        }
     }
     if let Some(value) = take(pairs, "clones") {
         match value.split(';').map(str::parse).collect::<Result<Vec<AttackerChoice>, _>>() {

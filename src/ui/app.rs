@@ -184,7 +184,7 @@ impl App {
                 color_map: 0,
                 clones: Vec::new(),
                 beta_mode: BetaMode::Retrain,
-                speed: 5,
+                speed: toolbar::DEFAULT_SPEED,
                 cell: None,
                 sought: None,
                 step: 0,

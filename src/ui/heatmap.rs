@@ -59,12 +59,17 @@ impl Heatmap<'_> {
         let pixels_per_point = ui.ctx().pixels_per_point();
         let Heatmap { version, color_map, .. } = self;
         let key = Key { version, rect, is_dark: ui.visuals().dark_mode, color_map, pixels_per_point };
-        let kept = pictures.kept.get(&response.id).filter(|(old, _)| *old == key);
-        let picture = kept.map(|(_, mesh)| mesh.clone()).unwrap_or_else(|| {
-            let mesh = Arc::new(self.tessellate(ui, rect, cell));
-            pictures.kept.insert(response.id, (key, mesh.clone()));
-            mesh
-        });
+        let picture = match pictures.kept.remove(&response.id) {
+            Some((old, mesh)) if old == key => mesh,
+            before => {
+                // The buffers of the picture before serve again.
+                let mut mesh = before.and_then(|(_, mesh)| Arc::into_inner(mesh)).unwrap_or_default();
+                mesh.clear();
+                self.tessellate(ui, rect, cell, &mut mesh);
+                Arc::new(mesh)
+            }
+        };
+        pictures.kept.insert(response.id, (key, picture.clone()));
         ui.painter().add(Shape::Mesh(picture));
         for &(state, reward) in self.rewards.iter().filter(|(state, _)| *state < self.grid.cells()) {
             let place = self.cell_rect(rect, cell, state);
@@ -106,7 +111,7 @@ impl Heatmap<'_> {
         Rect::from_min_size(rect.min + cell * vec2(col as f32, row as f32), cell)
     }
 
-    fn tessellate(&self, ui: &Ui, rect: Rect, cell: Vec2) -> Mesh {
+    fn tessellate(&self, ui: &Ui, rect: Rect, cell: Vec2, mesh: &mut Mesh) {
         let palette = Palette::of(ui);
         let options = ui.ctx().tessellation_options(|options| *options);
         let mut tessellator = Tessellator::new(
@@ -115,8 +120,7 @@ impl Heatmap<'_> {
             ui.ctx().fonts(|fonts| fonts.font_image_size()),
             vec![],
         );
-        let mut mesh = Mesh::default();
-        let mut add = |shape: Shape| tessellator.tessellate_shape(shape, &mut mesh);
+        let mut add = |shape: Shape| tessellator.tessellate_shape(shape, mesh);
         let colors = &COLOR_MAPS[self.color_map];
         // The ground, or what the colours have for it, shows between cells as a thin line, where there is room for one.
         add(Shape::rect_filled(rect, 0.0, colors.lines.map_or(palette.ground, rgb)));
@@ -139,7 +143,6 @@ impl Heatmap<'_> {
                 arrows(place, &self.policy.policy[state], ink).into_iter().for_each(&mut add);
             }
         }
-        mesh
     }
 }
 

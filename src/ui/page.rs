@@ -27,6 +27,11 @@ impl eframe::App for App {
     fn ui(&mut self, ui: &mut Ui, _frame: &mut eframe::Frame) {
         self.show(ui);
     }
+
+    /// The ground of the page: what is cleared with it need not be painted over.
+    fn clear_color(&self, visuals: &egui::Visuals) -> [f32; 4] {
+        visuals.panel_fill.to_normalized_gamma_f32()
+    }
 }
 
 impl App {
@@ -48,9 +53,10 @@ impl App {
             theme::enlarge_targets(ui);
         }
         let margin = if width < NARROW { 10 } else { SPACE as i8 };
-        let sheet = Frame::new().fill(Palette::of(ui).ground).inner_margin(Margin::symmetric(margin, 10));
+        let sheet = Frame::new().inner_margin(Margin::symmetric(margin, 10));
         if width < WIDE {
-            CentralPanel::no_frame().frame(sheet).show(ui, |ui| {
+            // Where its contents scroll they fade into the colour that they stand on.
+            CentralPanel::no_frame().frame(sheet.fill(Palette::of(ui).ground)).show(ui, |ui| {
                 ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
                     self.show_bar(ui);
                     self.show_tabs(ui);
@@ -88,12 +94,7 @@ impl App {
                 .exact_size(if is_lesson { LESSON } else { CONTROLS })
                 .resizable(false)
                 .show_separator_line(false)
-                .frame(Frame::new().fill(Palette::of(ui).ground).inner_margin(Margin {
-                    left: margin,
-                    right: 4,
-                    top: 0,
-                    bottom: 10,
-                }))
+                .frame(Frame::new().inner_margin(Margin { left: margin, right: 4, top: 0, bottom: 10 }))
                 .show(ui, |ui| {
                     theme::card(ui).show(ui, |ui| {
                         ScrollArea::vertical()
@@ -101,12 +102,7 @@ impl App {
                             .show(ui, |ui| if is_lesson { lesson::show(ui, self) } else { controls::show(ui, self) });
                     });
                 });
-            let rest = Frame::new().fill(Palette::of(ui).ground).inner_margin(Margin {
-                left: 12,
-                right: margin,
-                top: 0,
-                bottom: 10,
-            });
+            let rest = Frame::new().inner_margin(Margin { left: 12, right: margin, top: 0, bottom: 10 });
             CentralPanel::no_frame().frame(rest).show(ui, |ui| {
                 self.show_tabs(ui);
                 self.show_tab(ui, Shown::show_planned);

@@ -13,6 +13,9 @@ use crate::lab::{Command, RunState};
 pub const SPEEDS: [Option<f32>; 9] =
     [Some(1.0), Some(5.0), Some(20.0), Some(60.0), Some(150.0), Some(300.0), Some(600.0), Some(1500.0), None];
 
+/// The place in [`SPEEDS`] that the page opens with: a whole run of the paper in two and a half seconds.
+pub const DEFAULT_SPEED: usize = 5;
+
 pub fn show(ui: &mut Ui, app: &mut App) {
     if ui.available_width() < theme::NARROW {
         ui.horizontal(|ui| {

@@ -5,10 +5,10 @@
 //! the elements comes back through [`super::hands`].
 
 use std::cell::RefCell;
-use std::collections::{HashMap, HashSet};
 
 use egui::accesskit::{Live, Node, NodeId, Role, TreeUpdate};
 use egui::{Context, FullOutput, Plugin, RawInput};
+use fnv::{FnvHashMap as HashMap, FnvHashSet as HashSet};
 use web_sys::Element;
 
 use super::aria::{self, Kind, Relations, Said};
@@ -56,8 +56,8 @@ impl Mirror {
     /// `parent`: the empty element that will hold the mirror; `announcer`: the live region.
     pub fn new(parent: Element, announcer: Element, hands: Hands) -> Mirror {
         let announcer =
-            Announcer { element: announcer, live: HashMap::new(), waiting: Vec::new(), spoke: f64::NEG_INFINITY };
-        let elements = Elements { parent, shown: HashMap::new(), children: HashMap::new(), announcer };
+            Announcer { element: announcer, live: HashMap::default(), waiting: Vec::new(), spoke: f64::NEG_INFINITY };
+        let elements = Elements { parent, shown: HashMap::default(), children: HashMap::default(), announcer };
         MIRROR.set(Some((elements, hands)));
         Mirror(())
     }
@@ -104,9 +104,9 @@ impl Elements {
         let nodes: HashMap<NodeId, &Node> = update.nodes.iter().map(|(id, node)| (*id, node)).collect();
         let root = update.tree.as_ref().map_or(update.focus, |tree| tree.root);
         let mut order = Vec::with_capacity(nodes.len());
-        let mut children = HashMap::from([(None, Vec::new())]);
-        let mut owners = HashMap::new();
-        let mut live = HashMap::new();
+        let mut children = HashMap::from_iter([(None, Vec::new())]);
+        let mut owners = HashMap::default();
+        let mut live = HashMap::default();
         let mut stack = vec![(root, None)];
         while let Some((id, mut parent)) = stack.pop() {
             let Some(&node) = nodes.get(&id) else { continue };

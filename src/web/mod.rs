@@ -6,6 +6,7 @@ mod aria;
 mod files;
 #[cfg(feature = "page")]
 mod hands;
+mod measures;
 #[cfg(feature = "page")]
 mod mirror;
 #[cfg(feature = "page")]

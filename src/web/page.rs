@@ -19,6 +19,10 @@ extern "C" {
     /// Settles when the program may start: a newer version that waits takes over before (web/offline.js).
     #[wasm_bindgen(catch, js_name = newestVersion)]
     async fn newest_version() -> Result<JsValue, JsValue>;
+
+    /// Says that there will be something to paint in so many milliseconds (web/rest.js).
+    #[wasm_bindgen(js_name = wakePage)]
+    fn wake_page(delay: f64);
 }
 
 /// Starts the app; what keeps it from starting is shown as a sentence.
@@ -43,6 +47,7 @@ async fn run() -> Result<(), String> {
     let _ = newest_version().await;
     let canvas: HtmlCanvasElement =
         element("canvas")?.dyn_into().map_err(|_| "The element \"canvas\" is no canvas.")?;
+    without_antialiasing(&canvas).map_err(|error| format!("{error:?}"))?;
     let end = |id: &str| element(id)?.dyn_into().map_err(|_| format!("The element {id:?} cannot have the focus."));
     let hands = Hands::new(canvas.clone().into(), end("start")?, end("end")?);
     let mirror = Mirror::new(element("mirror")?, element("announcer")?, hands);
@@ -52,6 +57,7 @@ async fn run() -> Result<(), String> {
             WebOptions::default(),
             Box::new(|cc| {
                 cc.egui_ctx.add_plugin(mirror);
+                cc.egui_ctx.set_repaint_observer(|info| wake_page(1000.0 * info.delay.as_secs_f64()));
                 let waker = || {
                     let ctx = cc.egui_ctx.clone();
                     move || ctx.request_repaint()
@@ -77,5 +83,14 @@ async fn run() -> Result<(), String> {
     }
     element("message")?.set_attribute("hidden", "").map_err(|error| format!("{error:?}"))?;
     js_sys::Reflect::set(&window, &"pageHasStarted".into(), &true.into()).map_err(|error| format!("{error:?}"))?;
+    Ok(())
+}
+
+/// Makes the canvas's drawing context before eframe asks for it, which then gets this one: egui smooths its edges itself,
+/// and to do so four times over makes a weak graphics card twice as slow.
+fn without_antialiasing(canvas: &HtmlCanvasElement) -> Result<(), JsValue> {
+    let options = js_sys::Object::new();
+    js_sys::Reflect::set(&options, &"antialias".into(), &false.into())?;
+    canvas.get_context_with_context_options("webgl2", &options)?;
     Ok(())
 }

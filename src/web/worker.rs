@@ -11,6 +11,7 @@ use serde::de::DeserializeOwned;
 use wasm_bindgen::prelude::*;
 use web_sys::{DedicatedWorkerGlobalScope, ErrorEvent, MessageChannel, MessageEvent, Worker, WorkerOptions};
 
+use super::measures;
 use crate::experiment::Task;
 use crate::lab::{Command, Event, Hand, Link, PROTOCOL, Pace, Pool, Session, TaskEvent, decode, encode};
 
@@ -112,23 +113,32 @@ impl<E> Drop for Line<E> {
 pub struct WorkerLink {
     wake: Rc<dyn Fn()>,
     line: Line<Event>,
+    /// Run and update of the snapshot that has come last.
+    latest: Option<(u32, u32)>,
 }
 
 impl WorkerLink {
     /// Starts the worker; `wake` is called when an event has arrived.
     pub fn new(wake: impl Fn() + 'static) -> WorkerLink {
         let wake: Rc<dyn Fn()> = Rc::new(wake);
-        WorkerLink { line: Line::open(SESSION, wake.clone()), wake }
+        WorkerLink { line: Line::open(SESSION, wake.clone()), wake, latest: None }
     }
 }
 
 impl Link for WorkerLink {
     fn send(&mut self, command: &Command) {
+        if let (Command::Seen(_), Some((run, update))) = (command, self.latest) {
+            measures::shown(run, update);
+        }
         self.line.send(command);
     }
 
     fn receive(&mut self) -> Option<Result<Event, String>> {
-        self.line.receive()
+        let event = self.line.receive()?;
+        if let Ok(Event::Snapshot(snapshot)) = &event {
+            self.latest = Some((snapshot.run, snapshot.update));
+        }
+        Some(event)
     }
 
     fn restart(&mut self) {

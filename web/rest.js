@@ -1,0 +1,67 @@
+// Lets the page rest. eframe asks for an animation frame sixty times a second, whether there is something to paint or
+// not. Here it is made to wait while nothing happens; what may need a frame wakes it.
+(() => {
+  const request = window.requestAnimationFrame.bind(window);
+  const cancel = window.cancelAnimationFrame.bind(window);
+  /** How long frames go on after something has happened, and after a timer, in milliseconds. */
+  const LONG = 250;
+  const SHORT = 50;
+  /** How long it rests at most: whatever is not heard of here shows after that. */
+  const REST = 1000;
+  /** The frame that waits; then what the browser calls it. */
+  let waiting;
+  let called = 0;
+  let awakeUntil = 0;
+  let timer;
+  let alarm = Infinity;
+
+  /** Where somebody asks for it, every frame is measured (User Timing). */
+  const measured = (callback) => (time) => {
+    const start = performance.now();
+    callback(time);
+    if (window.apeLabMeasures) performance.measure("ape-lab: frame", { start, end: performance.now() });
+  };
+
+  window.requestAnimationFrame = (callback) => {
+    if (performance.now() < awakeUntil) return request(measured(callback));
+    waiting = callback;
+    wakeIn(REST);
+    return 0;
+  };
+
+  // The browser calls no frame 0: that is the one that waits or has waited.
+  window.cancelAnimationFrame = (frame) => {
+    if (frame !== 0) return cancel(frame);
+    if (waiting) waiting = undefined;
+    else cancel(called);
+  };
+
+  function wake(stay) {
+    awakeUntil = Math.max(awakeUntil, performance.now() + stay);
+    if (!waiting) return;
+    called = request(measured(waiting));
+    waiting = undefined;
+  }
+
+  function wakeIn(delay) {
+    const at = performance.now() + delay;
+    if (at >= alarm) return;
+    clearTimeout(timer);
+    alarm = at;
+    timer = setTimeout(() => {
+      alarm = Infinity;
+      wake(SHORT);
+    }, delay);
+  }
+
+  /** There will be something to paint in so many milliseconds (src/web/page.rs). */
+  window.wakePage = (delay) => (delay > 0 ? wakeIn(Math.min(delay, REST)) : wake(LONG));
+
+  const HAPPENINGS =
+    "pointerdown pointerup pointermove pointercancel mousemove mouseleave touchstart touchmove touchend touchcancel " +
+    "wheel keydown keyup beforeinput input compositionstart compositionupdate compositionend copy cut paste focus blur " +
+    "dragenter dragover dragleave drop resize hashchange popstate visibilitychange pageshow load";
+  for (const kind of HAPPENINGS.split(" ")) {
+    window.addEventListener(kind, () => wake(LONG), { capture: true, passive: true });
+  }
+})();
