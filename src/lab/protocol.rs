@@ -11,7 +11,7 @@ use crate::mdp::{KnownReturns, Policy, Returns};
 
 /// Version of the messages: an old cached worker must not be taken for a new one. [`Event::Ready`] stays the
 /// first variant, so that every version can read every other's.
-pub const PROTOCOL: u32 = 3;
+pub const PROTOCOL: u32 = 4;
 
 /// From the page to the session.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
