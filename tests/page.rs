@@ -419,7 +419,7 @@ fn the_bench_attacks_what_is_shown_and_saves_it() {
     page.get_by_label_contains("learning curve").click_accesskit();
     page.step();
     press(&mut page, "Attack the ensemble shown");
-    page.get_by(|node| says(node).is_some_and(|text| text.starts_with("The ensemble after update 732 returns −17.20")));
+    page.get_by(|node| says(node).is_some_and(|text| text.starts_with("The ensemble after update 732 returns −18.15")));
     press(&mut page, "CSV");
     press(&mut page, "JSON");
     press(&mut page, "Save the ensemble");
@@ -464,7 +464,7 @@ fn what_is_shown_can_be_taken_away() {
     for said in [
         "2 experts by PG-APE against the observer uniform (preset “Blind clone”): β = 0.60, seed 1, update 732 of 732.",
         "Grid of 10 × 10 cells, goal in row 0, column 0, no walls, slip 0. T = 100 steps.",
-        "Return, capped, in steps: ensemble −17.20, clone (uniform) −94.",
+        "Return, capped, in steps: ensemble −18.15, clone (uniform) −99.",
         "optimal −9.00. (−mean min(h(s), 100):",
         "100 or more steps to the goal",
         concat!("ape-lab ", env!("CARGO_PKG_VERSION"), ", digest "),
@@ -477,7 +477,7 @@ fn what_is_shown_can_be_taken_away() {
     let curve: Vec<&str> = saved[2].1.lines().collect();
     let last: Vec<&str> = curve.last().unwrap().split(',').collect();
     assert!(curve[0].starts_with("update,beta,ensemble_capped_return") && curve[0].split(',').count() == last.len());
-    assert_eq!((last[0], &last[2][..6]), ("732", "-17.19"));
+    assert_eq!((last[0], &last[2][..6]), ("732", "-18.14"));
     let model: ape_lab::mdp::TransitionModel = serde_json::from_str(&saved[3].1).unwrap();
     assert_eq!((model.states, model.shape), (100, [10, 10]));
 
@@ -665,7 +665,8 @@ fn a_thousand_races_agree_with_the_exact_figures() {
         let (sample, exact) = steps.split_once("steps (exact").unwrap();
         assert!((number(sample) - number(exact)).abs() < 3.0, "{sentence}");
     }
-    assert!(sentences[1].contains("0 % arrive") || sentences[1].contains("99"), "{}", sentences[1]);
+    let clone = sentences[1].split_once("arrive").unwrap().0;
+    assert!(number(clone) < 50.0, "most clones are lost: {clone}");
     assert_eq!(sentences[2], "100 % arrive (exact 100 %), 0 % are lost; 18.0 steps (exact 18.0)");
     text(
         &page,
@@ -851,7 +852,7 @@ fn the_lesson_is_true_of_what_is_shown() {
         }
         let live = page.query_all_by(|node| {
             says(node).is_some_and(|text| {
-                ["The expert returns", "The ensemble returns", "Row 2", "Within T the", "Left: the", "The clone ("]
+                ["The expert returns", "The ensemble returns", "Row 1", "Within T the", "Left: the", "The clone ("]
                     .iter()
                     .any(|start| text.starts_with(start))
             })

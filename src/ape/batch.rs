@@ -7,6 +7,7 @@
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
+use super::Ensemble;
 use crate::mdp::{ACTIONS, ActionDraw, Draw, Grid, one_of};
 
 /// Most walkers at once: more would not fit into a processor's registers.
@@ -32,12 +33,21 @@ impl Step {
     }
 }
 
-/// Where episodes are played, laid out for speed: as many copies of the grid as one plays on, each a context of its
-/// own. A place is `copy · S + state`.
-#[derive(Clone)]
+/// What happens at a pair (context, state), all in one place.
+#[derive(Clone, Copy)]
+#[repr(align(32))]
+struct Row {
+    actions: ActionDraw,
+    /// The place that each executed action leads to, padded; [`Course::GOAL`] for the goal.
+    next: [u16; 8],
+}
+
+/// Where episodes are played, and by which policies. A place is a state, or for the ensemble, whose episodes keep their
+/// expert, a pair (context, state), `c · S + s`.
 pub struct Course {
-    /// `[copies][S][8]`: the place that each executed action leads to, padded; [`Course::GOAL`] for the goal.
-    next: Vec<[u16; 8]>,
+    /// `[n][S]`.
+    rows: Vec<Row>,
+    /// Places where an episode may start.
     starts: Vec<u32>,
     cells: usize,
     slip: Draw<1>,
@@ -49,45 +59,42 @@ pub struct Course {
 impl Course {
     const GOAL: u16 = u16::MAX;
 
-    /// Episodes of at most `horizon` steps, below 2¹⁶.
-    pub fn new(grid: &Grid, horizon: u32, copies: usize) -> Course {
-        let cells = grid.cells();
-        let next = |place: usize| {
-            let to = grid.next(place % cells).map(|state| state as usize);
-            let to =
-                to.map(|state| if state == grid.goal() { Self::GOAL } else { (place - place % cells + state) as u16 });
-            std::array::from_fn(|action| to[action.min(ACTIONS - 1)])
+    /// Episodes of at most `horizon` steps, below 2¹⁶. They keep their expert, or draw one at each step.
+    pub fn new(grid: &Grid, experts: usize, keeps_expert: bool, horizon: u32) -> Course {
+        let first = |context: usize| if keeps_expert { context * grid.cells() } else { 0 };
+        let row = |pair: usize| {
+            let (context, state) = (pair / grid.cells(), pair % grid.cells());
+            let next = std::array::from_fn(|action| {
+                let next = grid.next(state)[action.min(ACTIONS - 1)] as usize;
+                if next == grid.goal() { Self::GOAL } else { (first(context) + next) as u16 }
+            });
+            Row { actions: ActionDraw::new(&[1.0]), next }
         };
+        let contexts = if keeps_expert { experts } else { 1 };
+        let places = |&state: &u32| (0..contexts).map(move |context| first(context) as u32 + state);
         Course {
-            next: (0..copies * cells).map(next).collect(),
-            starts: grid.starts().to_vec(),
-            cells,
+            rows: (0..experts * grid.cells()).map(row).collect(),
+            starts: grid.starts().iter().flat_map(places).collect(),
+            cells: grid.cells(),
             slip: Draw::new(&[1.0 - grid.slip(), grid.slip()]),
             is_slippery: grid.slip() > 0.0,
             end: horizon * Step::TICK,
         }
     }
 
-    /// Where an episode begins: any copy, any start. Not often, so it is kept out of the way.
+    /// From now on these are the experts.
+    pub fn set(&mut self, ensemble: &Ensemble) {
+        for (policy, rows) in ensemble.policies().iter().zip(self.rows.chunks_mut(self.cells)) {
+            policy.rows().iter().zip(rows).for_each(|(pi, row)| row.actions = ActionDraw::new(pi));
+        }
+    }
+
+    /// Where an episode begins. Not often, so it is kept out of the way.
     #[cold]
     #[inline(never)]
     fn start(&self, starts: &mut Starts<impl Rng>) -> usize {
         starts.drawn = starts.drawn.wrapping_add(1);
-        let bits = starts.rng.next_u64();
-        let copy = one_of(self.next.len() / self.cells, (bits >> 32) as u32);
-        copy * self.cells + self.starts[one_of(self.starts.len(), bits as u32)] as usize
-    }
-
-    /// Where choosing `action` leads, on a grid that slips or not.
-    #[inline(always)]
-    fn lead<const SLIPS: bool>(&self, place: usize, action: usize, rng: &mut impl Rng) -> u16 {
-        let mut executed = action;
-        if SLIPS {
-            let bits = rng.next_u64();
-            let other = one_of(ACTIONS, bits as u32);
-            executed = if self.slip.outcome((bits >> 32) as u32) == 1 { other } else { action };
-        }
-        self.next[place][executed]
+        self.starts[one_of(self.starts.len(), starts.rng.next_u32())] as usize
     }
 }
 
@@ -115,60 +122,62 @@ impl Luck<Xoshiro256PlusPlus> {
     }
 }
 
-/// Who chooses the actions.
+/// Who says which expert acts.
 pub trait Player {
-    /// Whether a choice takes 64 random bits, not 32.
-    const IS_WIDE: bool;
+    /// Whether that takes 32 random bits.
+    const DRAWS: bool;
 
-    /// The pair (context, state), `c · S + s`, and the action.
-    fn act(&self, place: usize, bits: u64) -> (usize, usize);
+    /// The pair (context, state), `c · S + s`, whose policy acts at a place.
+    fn pair(&self, place: usize, bits: u32) -> usize;
 }
 
-/// The ensemble, each expert on its own copy of the grid.
-pub struct EnsemblePlayer<'a> {
-    /// `[n][S]`.
-    pub actions: &'a [ActionDraw],
-}
+/// The ensemble: the expert was drawn with the start.
+pub struct EnsemblePlayer;
 
-impl Player for EnsemblePlayer<'_> {
-    const IS_WIDE: bool = false;
+impl Player for EnsemblePlayer {
+    const DRAWS: bool = false;
 
     #[inline(always)]
-    fn act(&self, place: usize, bits: u64) -> (usize, usize) {
-        (place, self.actions[place].outcome(bits as u32))
+    fn pair(&self, place: usize, _bits: u32) -> usize {
+        place
     }
 }
 
-/// The clone: the context is drawn anew at each cell, then the action from that expert. Of `ENDS` + 1 experts at
-/// most.
-pub struct ClonePlayer<'a, const ENDS: usize> {
-    /// `[n][S]`.
-    pub actions: &'a [ActionDraw],
+/// The clone: the expert is drawn anew at each step. Of `ENDS` + 1 experts at most.
+pub struct ClonePlayer<const ENDS: usize> {
     /// `[S]`.
-    pub contexts: &'a [Draw<ENDS>],
+    pub contexts: Vec<Draw<ENDS>>,
 }
 
-impl<const ENDS: usize> Player for ClonePlayer<'_, ENDS> {
-    const IS_WIDE: bool = true;
+impl<const ENDS: usize> Player for ClonePlayer<ENDS> {
+    const DRAWS: bool = true;
 
     #[inline(always)]
-    fn act(&self, place: usize, bits: u64) -> (usize, usize) {
-        let pair = self.contexts[place].outcome((bits >> 32) as u32) * self.contexts.len() + place;
-        (pair, self.actions[pair].outcome(bits as u32))
+    fn pair(&self, place: usize, bits: u32) -> usize {
+        self.contexts[place].outcome(bits) * self.contexts.len() + place
     }
 }
 
-/// A choice that was made already.
-struct Chosen {
-    pair: usize,
-    action: usize,
+/// A clone that goes by what it has seen of its episode.
+pub trait RememberingPlayer {
+    /// An episode begins.
+    fn begin(&mut self);
+
+    /// The context that acts at a state.
+    fn context(&mut self, state: usize, bits: u32) -> usize;
+
+    /// What was done there.
+    fn acted(&mut self, state: usize, action: usize);
 }
 
-impl Player for Chosen {
-    const IS_WIDE: bool = true;
+/// A pair that is known.
+struct Known(usize);
 
-    fn act(&self, _place: usize, _bits: u64) -> (usize, usize) {
-        (self.pair, self.action)
+impl Player for Known {
+    const DRAWS: bool = false;
+
+    fn pair(&self, _place: usize, _bits: u32) -> usize {
+        self.0
     }
 }
 
@@ -195,9 +204,17 @@ impl Walker {
         steps: &mut impl Rng,
         starts: &mut Starts<impl Rng>,
     ) -> Step {
-        let (pair, action) = player.act(self.place, bits);
+        let pair = player.pair(self.place, (bits >> 32) as u32);
+        let row = &course.rows[pair];
+        let action = row.actions.outcome(bits as u32);
+        let mut executed = action;
+        if SLIPS {
+            let bits = steps.next_u64();
+            let other = one_of(ACTIONS, bits as u32);
+            executed = if course.slip.outcome((bits >> 32) as u32) == 1 { other } else { action };
+        }
         let step = Step((pair * ACTIONS + action) as u32 + self.clock);
-        let next = course.lead::<SLIPS>(self.place, action, steps);
+        let next = row.next[executed];
         self.place = usize::from(next);
         self.clock += Step::TICK;
         if (next == Course::GOAL) | (self.clock == course.end) {
@@ -252,11 +269,11 @@ impl Batch {
             let bits = steps.next_u64();
             row[0] = a.step::<SLIPS>(course, player, bits, &mut steps, &mut luck.starts);
             // Of 64 bits, two walkers take a half each where that is enough.
-            let bits = if P::IS_WIDE { steps.next_u64() } else { bits >> 32 };
+            let bits = if P::DRAWS { steps.next_u64() } else { bits >> 32 };
             row[1] = b.step::<SLIPS>(course, player, bits, &mut steps, &mut luck.starts);
             let bits = steps.next_u64();
             row[2] = c.step::<SLIPS>(course, player, bits, &mut steps, &mut luck.starts);
-            let bits = if P::IS_WIDE { steps.next_u64() } else { bits >> 32 };
+            let bits = if P::DRAWS { steps.next_u64() } else { bits >> 32 };
             row[3] = d.step::<SLIPS>(course, player, bits, &mut steps, &mut luck.starts);
         }
         luck.steps = steps;
@@ -273,13 +290,13 @@ impl Batch {
         self.episodes = luck.starts.drawn.wrapping_sub(before) - WALKERS as u32;
     }
 
-    /// Plays as a clone that remembers its episode; `act` chooses context and action at (state, time) by 64 random bits.
-    pub fn play_one(
+    /// Plays as a clone that remembers its episode: one walker.
+    pub fn play_remembering(
         &mut self,
         course: &Course,
+        player: &mut impl RememberingPlayer,
         wanted: u32,
         luck: &mut Luck<impl Rng>,
-        mut act: impl FnMut(usize, usize, u64) -> (usize, usize),
     ) {
         self.rows.clear();
         self.tails.iter_mut().for_each(Vec::clear);
@@ -287,14 +304,19 @@ impl Batch {
         let tail = &mut self.tails[0];
         let mut walker = Walker::begin(course, luck);
         while walker.clock > 0 || tail.len() < wanted as usize {
-            let (context, action) = act(walker.place, Step(walker.clock).time(), luck.steps.next_u64());
-            let pair = context * course.cells + walker.place;
-            let player = Chosen { pair, action };
-            tail.push(if course.is_slippery {
-                walker.step::<true>(course, &player, 0, &mut luck.steps, &mut luck.starts)
+            if walker.clock == 0 {
+                player.begin();
+            }
+            let state = walker.place;
+            let bits = luck.steps.next_u64();
+            let pair = Known(player.context(state, (bits >> 32) as u32) * course.cells + state);
+            let step = if course.is_slippery {
+                walker.step::<true>(course, &pair, bits, &mut luck.steps, &mut luck.starts)
             } else {
-                walker.step::<false>(course, &player, 0, &mut luck.steps, &mut luck.starts)
-            });
+                walker.step::<false>(course, &pair, bits, &mut luck.steps, &mut luck.starts)
+            };
+            player.acted(state, step.entry() % ACTIONS);
+            tail.push(step);
         }
         self.episodes = luck.starts.drawn.wrapping_sub(before) - 1;
     }
@@ -319,7 +341,7 @@ impl Batch {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mdp::GridSpec;
+    use crate::mdp::{GridSpec, Policy};
 
     /// Every walker goes through whole episodes, one expert to each, from a start to the goal or until time is over, whatever
     /// the batch's size; a batch of many steps is shared by all of them.
@@ -328,12 +350,13 @@ mod tests {
         let walls = vec![(1, 1), (2, 3)];
         let grid = Grid::new(GridSpec { rows: 4, cols: 5, goal: (3, 0), walls, slip: 0.0 }).unwrap();
         let (experts, horizon) = (3, 20);
-        let actions = vec![ActionDraw::new(&[0.2; ACTIONS]); experts * grid.cells()];
-        let course = Course::new(&grid, horizon, experts);
+        let uniform = Policy::from_rows(vec![[0.2; ACTIONS]; grid.cells()]);
+        let mut course = Course::new(&grid, experts, true, horizon);
+        course.set(&Ensemble::new(vec![uniform; experts]));
         let mut luck = Luck::new(1);
         let mut batch = Batch::default();
         for (wanted, walkers) in [(1, 1), (79, 1), (80, 4), (5000, 4)] {
-            batch.play(&course, &EnsemblePlayer { actions: &actions }, wanted, &mut luck);
+            batch.play(&course, &EnsemblePlayer, wanted, &mut luck);
             assert!((wanted as usize..(wanted + 4 * horizon) as usize).contains(&batch.steps()));
             let (mut episodes, mut at_work) = (0, 0);
             for walk in batch.walks() {

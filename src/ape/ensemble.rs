@@ -93,6 +93,11 @@ impl Contexts {
         &self.p[state * self.experts..][..self.experts]
     }
 
+    /// p(·|s) of every cell.
+    pub fn rows(&self) -> impl Iterator<Item = &[f64]> {
+        self.p.chunks(self.experts)
+    }
+
     /// `[S][n]`, row by row.
     pub fn as_slice(&self) -> &[f64] {
         &self.p

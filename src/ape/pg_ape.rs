@@ -8,23 +8,21 @@
 //! of a batch but how often each (context, state, action) was taken and the sum of the returns that followed: a
 //! [`Tally`].
 
-use std::sync::Arc;
-
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::adam::Adam;
 use super::algorithm::{Algorithm, Experts};
-use super::batch::{Batch, ClonePlayer, Course, EnsemblePlayer, Luck};
+use super::batch::{Batch, ClonePlayer, Course, EnsemblePlayer, Luck, RememberingPlayer};
 use super::observer::{Memory, Observer};
 use super::tally::{Rewards, Tally};
 use super::{AdversaryReward, BaselineKind, Config, Contexts, Ensemble, GradientKind, ReturnToGo};
-use crate::mdp::{ACTIONS, ActionDraw, Draw, Grid, Policy};
+use crate::mdp::{ACTIONS, Draw, Grid};
 
 /// What one update plays. The next begins anew, so that a copy of it is empty.
 #[derive(Default)]
 struct Played {
-    /// `[n][S]`.
-    actions: Vec<ActionDraw>,
+    /// Of the ensemble and of the clone; made when first needed.
+    courses: Option<[Course; 2]>,
     batch: Batch,
     ensemble_tally: Tally,
     clone_tally: Tally,
@@ -58,8 +56,6 @@ pub struct PgApe {
     weights: Option<Vec<f64>>,
     /// r̃ by entry, `[n][S][5]`, where the clone's reward is not the experts'.
     adversary_reward: Option<Vec<f64>>,
-    /// The grid, a copy for each expert, and that of the clone.
-    courses: Arc<[Course; 2]>,
     played: Played,
 }
 
@@ -82,7 +78,6 @@ impl PgApe {
             values_adam: Adam::new(values),
             weights,
             adversary_reward: config.adversary_reward.as_ref().map(by_entry),
-            courses: Arc::new([experts, 1].map(|copies| Course::new(&grid, config.horizon, copies))),
             played: Played::default(),
             experts: Experts::new(grid, config, vec![0.0; pairs * ACTIONS]),
         }
@@ -100,11 +95,12 @@ impl PgApe {
 
     /// Plays τ₁: an expert is drawn for an episode and acts for all of it.
     fn play_ensemble(&mut self, ensemble: &Ensemble) {
-        let Config { batch_steps, discount, observer, .. } = self.experts.config;
-        self.played.actions.clear();
-        self.played.actions.extend(ensemble.policies().iter().flat_map(Policy::rows).map(|row| ActionDraw::new(row)));
-        let player = EnsemblePlayer { actions: &self.played.actions };
-        self.played.batch.play(&self.courses[0], &player, batch_steps, &mut self.luck);
+        let Config { batch_steps, discount, observer, horizon, .. } = self.experts.config;
+        let Experts { grid, .. } = &self.experts;
+        let new = || [true, false].map(|keeps_expert| Course::new(grid, ensemble.experts(), keeps_expert, horizon));
+        let courses = self.played.courses.get_or_insert_with(new);
+        courses.iter_mut().for_each(|course| course.set(ensemble));
+        self.played.batch.play(&courses[0], &EnsemblePlayer, batch_steps, &mut self.luck);
         let rewards = Rewards { discount, by_entry: None, weights: self.weights.as_deref() };
         self.played.ensemble_tally.count(self.experts.logits.len(), &self.played.batch, rewards);
         if observer.model().learns {
@@ -133,46 +129,23 @@ impl PgApe {
         }
     }
 
-    /// Plays τ₂: the context is drawn anew at each state, then the action from that expert.
+    /// Plays τ₂: the context is drawn anew at each state, then the action from that expert. The ensemble has played
+    /// before.
     fn play_clone(&mut self, ensemble: &Ensemble, contexts: &Contexts) {
+        let Config { batch_steps, discount, .. } = self.experts.config;
+        let Played { courses: Some([_, course]), batch, clone_tally, .. } = &mut self.played else { return };
         match (self.observer.memory(ensemble), ensemble.experts()) {
-            (Some(memory), _) => self.play_remembering(ensemble.experts(), &*memory),
-            (None, ..=2) => self.play_blind::<1>(contexts),
-            (None, ..=4) => self.play_blind::<3>(contexts),
-            (None, _) => self.play_blind::<{ Config::MAX_EXPERTS as usize - 1 }>(contexts),
+            (Some(memory), n) => {
+                let mut player = Remembering { memory: &*memory, remembered: Vec::new(), p: vec![0.0; n] };
+                batch.play_remembering(course, &mut player, batch_steps, &mut self.luck);
+            }
+            (None, ..=2) => batch.play(course, &blind::<1>(contexts), batch_steps, &mut self.luck),
+            (None, ..=4) => batch.play(course, &blind::<3>(contexts), batch_steps, &mut self.luck),
+            (None, _) => batch.play(course, &blind::<MOST_ENDS>(contexts), batch_steps, &mut self.luck),
         }
-        let Config { discount, .. } = self.experts.config;
         let rewards =
             Rewards { discount, by_entry: self.adversary_reward.as_deref(), weights: self.weights.as_deref() };
-        self.played.clone_tally.count(self.experts.logits.len(), &self.played.batch, rewards);
-    }
-
-    fn play_blind<const ENDS: usize>(&mut self, contexts: &Contexts) {
-        let draw = |state| Draw::new(contexts.row(state));
-        let contexts: Vec<Draw<ENDS>> = (0..self.experts.grid.cells()).map(draw).collect();
-        let player = ClonePlayer { actions: &self.played.actions, contexts: &contexts };
-        self.played.batch.play(&self.courses[1], &player, self.experts.config.batch_steps, &mut self.luck);
-    }
-
-    fn play_remembering(&mut self, experts: usize, memory: &dyn Memory) {
-        let (actions, cells) = (&self.played.actions, self.experts.grid.cells());
-        let mut remembered = Vec::new();
-        let mut p = vec![0.0; experts];
-        self.played.batch.play_one(
-            &self.courses[1],
-            self.experts.config.batch_steps,
-            &mut self.luck,
-            |state, time, bits| {
-                if time == 0 {
-                    remembered = memory.start();
-                }
-                memory.see(&mut remembered, state, &mut p);
-                let context = Draw::<{ Config::MAX_EXPERTS as usize - 1 }>::new(&p).outcome((bits >> 32) as u32);
-                let action = actions[context * cells + state].outcome(bits as u32);
-                memory.act(&mut remembered, state, action);
-                (context, action)
-            },
-        );
+        clone_tally.count(self.experts.logits.len(), batch, rewards);
     }
 
     /// G₁ + G₂ (paper, Eqs. 5–7).
@@ -262,6 +235,36 @@ impl PgApe {
             gradient[index] += fit(&self.played.clone_tally, pair, scale, self.values[index]);
         }
         gradient
+    }
+}
+
+const MOST_ENDS: usize = Config::MAX_EXPERTS as usize - 1;
+
+/// The clone by p(c|s).
+fn blind<const ENDS: usize>(contexts: &Contexts) -> ClonePlayer<ENDS> {
+    ClonePlayer { contexts: contexts.rows().map(Draw::new).collect() }
+}
+
+/// The clone by p(c|τ).
+struct Remembering<'a> {
+    memory: &'a dyn Memory,
+    remembered: Vec<f64>,
+    /// `[n]`.
+    p: Vec<f64>,
+}
+
+impl RememberingPlayer for Remembering<'_> {
+    fn begin(&mut self) {
+        self.remembered = self.memory.start();
+    }
+
+    fn context(&mut self, state: usize, bits: u32) -> usize {
+        self.memory.see(&mut self.remembered, state, &mut self.p);
+        Draw::<MOST_ENDS>::new(&self.p).outcome(bits)
+    }
+
+    fn acted(&mut self, state: usize, action: usize) {
+        self.memory.act(&mut self.remembered, state, action);
     }
 }
 

@@ -100,7 +100,7 @@ pub static STEPS: [Step; 10] = [
     },
     Step {
         title: "Why the clone wanders",
-        scene: Scene { setup: parted, clones: &["uniform", "occupancy"], kind: CAPPED, mark: Mark::Cell(2, 2) },
+        scene: Scene { setup: parted, clones: &["uniform", "occupancy"], kind: CAPPED, mark: Mark::Cell(1, 2) },
         blocks: &[
             Text(
                 "Look at one cell, marked in every panel. Each expert knows where it wants to go, and they want opposite ways. The blind clone gives \
@@ -136,7 +136,7 @@ pub static STEPS: [Step; 10] = [
     },
     Step {
         title: "But who is the observer?",
-        scene: Scene { setup: honest, clones: &["occupancy", "uniform"], kind: CAPPED, mark: Mark::Cell(2, 2) },
+        scene: Scene { setup: honest, clones: &["occupancy", "uniform"], kind: CAPPED, mark: Mark::Cell(1, 2) },
         blocks: &[
             Text(
                 "So far the clone weighed the experts equally, everywhere. Nobody has to. Whoever clones the demonstrations themselves \
@@ -204,7 +204,7 @@ pub static STEPS: [Step; 10] = [
     },
     Step {
         title: "A clone that remembers",
-        scene: Scene { setup: parted, clones: &["uniform", "history"], kind: WITHIN, mark: Mark::Cell(2, 2) },
+        scene: Scene { setup: parted, clones: &["uniform", "history"], kind: WITHIN, mark: Mark::Cell(1, 2) },
         blocks: &[
             Text(
                 "Back to the parted experts and the blind clone. A cloner may also remember its own episode. It asks: of the experts, who would have \
