@@ -90,10 +90,12 @@ impl Chain {
     /// One step forwards: from the probability of being at each cell to that a step later. What arrives stands at the
     /// goal.
     pub fn forward(&self, now: &Field, next: &mut Field) {
-        let [d0, d1, d2, d3, d4] = self.distances.map(|distance| -distance);
-        let [p0, p1, p2, p3, p4] = [0, 1, 2, 3, 4].map(|a| self.moves[a].shifted(-self.distances[a]));
-        let [x0, x1, x2, x3, x4] = [d0, d1, d2, d3, d4].map(|distance| now.shifted(distance));
-        for (i, next) in next.cells_mut().iter_mut().enumerate() {
+        let next = next.cells_mut();
+        let cells = next.len();
+        // All of one length, that nothing has to be checked in the loop.
+        let [p0, p1, p2, p3, p4] = [0, 1, 2, 3, 4].map(|a| &self.moves[a].shifted(-self.distances[a])[..cells]);
+        let [x0, x1, x2, x3, x4] = self.distances.map(|distance| &now.shifted(-distance)[..cells]);
+        for (i, next) in next.iter_mut().enumerate() {
             let sum = (p0[i] * x0[i] + p1[i] * x1[i]) + (p2[i] * x2[i] + p3[i] * x3[i]) + p4[i] * x4[i];
             *next = if sum < Self::NOTHING { 0.0 } else { sum };
         }
@@ -102,14 +104,16 @@ impl Chain {
     /// One step backwards: from what each cell is worth to what it is worth to be led on from each, plus
     /// `immediate`, `[S]`. The goal and walls keep theirs.
     pub fn backward(&self, ahead: &Field, immediate: &[f64], now: &mut Field) {
-        let [p0, p1, p2, p3, p4] = [0, 1, 2, 3, 4].map(|a| self.moves[a].cells());
-        let [x0, x1, x2, x3, x4] = self.distances.map(|distance| ahead.shifted(distance));
-        let cells = now.cells_mut();
-        for (i, (now, immediate)) in cells.iter_mut().zip(immediate).enumerate() {
-            let sum = (p0[i] * x0[i] + p1[i] * x1[i]) + (p2[i] * x2[i] + p3[i] * x3[i]) + p4[i] * x4[i] + immediate;
-            *now = if sum.abs() < Self::NOTHING { 0.0 } else { sum };
+        let now = now.cells_mut();
+        let cells = now.len();
+        let [p0, p1, p2, p3, p4] = [0, 1, 2, 3, 4].map(|a| &self.moves[a].cells()[..cells]);
+        let [x0, x1, x2, x3, x4] = self.distances.map(|distance| &ahead.shifted(distance)[..cells]);
+        let immediate = &immediate[..cells];
+        for i in 0..cells {
+            let sum = (p0[i] * x0[i] + p1[i] * x1[i]) + (p2[i] * x2[i] + p3[i] * x3[i]) + p4[i] * x4[i] + immediate[i];
+            now[i] = if sum.abs() < Self::NOTHING { 0.0 } else { sum };
         }
-        cells[self.goal] = ahead.cells()[self.goal];
+        now[self.goal] = ahead.cells()[self.goal];
     }
 }
 
