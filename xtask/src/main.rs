@@ -144,7 +144,9 @@ fn build() -> Result<(), Failure> {
         let name = file.to_string_lossy();
         steps::say(&format!("wasm-opt on {name} (under a minute)"));
         let before = size(&file)?;
-        run("node", &["web/node_modules/binaryen/bin/wasm-opt", "-Oz", &name, "-o", &name])?;
+        // The worker is small and must be fast.
+        let level = if name.contains("worker") { "-O3" } else { "-Oz" };
+        run("node", &["web/node_modules/binaryen/bin/wasm-opt", level, &name, "-o", &name])?;
         println!("{before} bytes before, {} after", size(&file)?);
     }
     // The files are no longer those that trunk's hook has seen.
