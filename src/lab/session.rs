@@ -146,7 +146,7 @@ impl Session {
                 let run = self.training()?;
                 (run.is_playing, run.is_silent) = (false, false);
                 run.last_update = run.last_update.max(run.trainer().updates() + 1);
-                run.update();
+                run.update(&|| 0.0);
             }
             Command::Reset => {
                 self.begin_queued()?;
@@ -340,9 +340,7 @@ impl Session {
             if speed.is_some() {
                 self.allowance -= 1.0;
             }
-            let begin = clock();
-            run.update();
-            run.training_ms += clock() - begin;
+            run.update(clock);
             self.is_changed = true;
         }
         match speed {
@@ -398,9 +396,11 @@ impl Run {
 
     /// One update, and what follows it: the recording, the curve, the end of the run. Of updates that were made before only
     /// the last follows.
-    fn update(&mut self) {
+    fn update(&mut self, clock: &dyn Fn() -> f64) {
         let Subject::Training(trainer) = &mut self.subject else { return };
+        let begin = clock();
         advance(trainer, &self.setup.course);
+        self.training_ms += clock() - begin;
         let updates = trainer.updates();
         if updates >= self.last_update {
             self.is_playing = false;

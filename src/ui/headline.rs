@@ -217,7 +217,7 @@ fn progress(app: &App) -> String {
         RunState::Playing => format!("training, {of}"),
         RunState::Paused => format!("paused at {of}{}", digest(app, snapshot)),
         RunState::Finished => {
-            format!("trained, {of}, {} of work{}", seconds(snapshot.training_ms), digest(app, snapshot))
+            format!("trained, {of}, {} of training{}", seconds(snapshot.training_ms), digest(app, snapshot))
         }
     }
 }

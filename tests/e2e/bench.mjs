@@ -84,11 +84,11 @@ async function training(browser, site) {
     run = next.run;
     times.push(next.end - (await page.evaluate(() => window.bench.key)));
     const words = await until(() => status(page).textContent(), (text) => text.startsWith("trained"));
-    if (move % 2) works.push(Number(words.match(/(\d+) ms of work/)[1]));
+    if (move % 2) works.push(Number(words.match(/(\d+) ms of training/)[1]));
     // A visitor's next move may come at any part of a frame.
     await wait(150 + 97 * Math.random());
   }
-  row("default training run in the browser's worker", "ms", 45, "median", works, "The time of work that the page shows once the default run (732 updates, seed 1, β 0.6) has been trained.");
+  row("default training run in the browser's worker", "ms", 45, "median", works, "The time of training that the page shows (updates alone, without the points of the curve) once the default run (732 updates, seed 1, β 0.6) has been trained.");
   row("β moved → every panel shows the retrained result", "ms", 100, "p95", times.slice(4), "From the time stamp of a pressed arrow key to the end of the animation frame that drew the trained result; four moves to warm up.");
   await close();
 }
