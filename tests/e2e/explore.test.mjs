@@ -62,21 +62,21 @@ test("the whole lesson: every step sets its stage and says what is on the page",
   await says(page, "Cell in row 1, column 2");
   await page.screenshot({ path: SHOTS + "learn-1280x800-light.png" });
   await next("A little for the experts, a lot for the clone");
-  await says(page, /^Within T the ensemble needs \d\.\d steps more than the best, the clone 8\d\.\d/);
+  await says(page, /^Within T the ensemble needs \d\.\d steps more than the best, the clone 7\d\.\d/);
   await next("But who is the observer?");
   await until(() => figure(page, "Clone \\(occupancy\\)"), (value) => value > -16);
   assert.ok(Math.abs((await figure(page, "Clone \\(occupancy\\)")) - (await figure(page, "Ensemble"))) <= 0.5);
   await next("It must be so");
   const text = await until(
     async () => (await page.locator("#mirror").getByText(/^Left: the honest clone takes/).allTextContents())[0] ?? "",
-    (text) => /together/.test(text) && /takes 16/.test(text),
+    (text) => /together/.test(text) && /takes 18/.test(text),
   );
   const [left, , , right] = text.match(/\d+\.\d+/g).map(Number);
   assert.ok(Math.abs(left - right) < 0.02, text);
   await next("The trap, and what a cap hides");
   await says(page, /^The clone \(occupancy\) returns −90\.5 capped, −10\.8 within T/);
   await next("A clone that remembers");
-  await says(page, /the clone \(uniform\) −\d+\.\d, the clone \(history\) −16\.\d \(within T\)/);
+  await says(page, /the clone \(uniform\) −\d+\.\d, the clone \(history\) −18\.\d \(within T\)/);
   await next("Where this leaves protection");
   assert.equal(await widget(page, "button", "Next").getAttribute("aria-disabled"), "true");
   await click(page, "button", "Draw a world");
