@@ -138,7 +138,7 @@ fn dual_ascent_keeps_to_the_constraint() {
         .map(|seed| CurvePoint::of(&mut train(Config { alpha: Some(-20.0), seed, ..Config::default() })));
     let mean = points.iter().map(|point| point.ensemble.horizon_return).sum::<f64>() / points.len() as f64;
     assert!((-21.0..-18.5).contains(&mean), "{mean}: {points:?}");
-    assert!(points.iter().all(|point| point.clone.horizon_return < -70.0), "{points:?}");
+    assert!(points.iter().all(|point| point.clone.horizon_return < -75.0), "{points:?}");
 }
 
 /// The semantics of reward: lured into a corner, though the experts go home.
