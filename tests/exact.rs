@@ -134,10 +134,10 @@ fn dual_ascent_keeps_to_the_constraint() {
         assert!(point.clone.horizon_return < -75.0 && point.beta != 0.6, "{alpha}: {point:?}");
     }
     // PG-APE has noise to fight with, about 1 step from seed to seed; α well below the optimum is kept in the mean.
-    let points = [1, 2, 3, 4, 5, 6]
+    let points = [1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12]
         .map(|seed| CurvePoint::of(&mut train(Config { alpha: Some(-20.0), seed, ..Config::default() })));
     let mean = points.iter().map(|point| point.ensemble.horizon_return).sum::<f64>() / points.len() as f64;
-    assert!((-21.0..-18.5).contains(&mean), "{mean}: {points:?}");
+    assert!((-20.5..-18.5).contains(&mean), "{mean}: {points:?}");
     assert!(points.iter().all(|point| point.clone.horizon_return < -75.0), "{points:?}");
 }
 
