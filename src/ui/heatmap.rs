@@ -5,21 +5,24 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
+use egui::emath::GuiRounding as _;
 use egui::epaint::{Mesh, Tessellator};
 use egui::{
-    Color32, EventFilter, Id, Pos2, Rect, Response, Role, Sense, Shape, Stroke, StrokeKind, Ui, Vec2, WidgetInfo, pos2,
-    vec2,
+    Color32, EventFilter, Id, Pos2, Rect, Response, Role, Sense, Shape, Stroke, StrokeKind, TextureId, Ui, Vec2,
+    WidgetInfo, pos2, vec2,
 };
 
+use super::arrows::Pen;
 use super::theme::Palette;
 use crate::lab::PolicyView;
-use crate::mdp::{Action, Grid};
+use crate::mdp::Grid;
 use crate::picture::COLOR_MAPS;
 
 /// Pictures of the last frame, by panel.
 #[derive(Default)]
 pub struct Pictures {
     kept: HashMap<Id, (Key, Arc<Mesh>)>,
+    pen: Option<Pen>,
 }
 
 /// All that a picture depends on besides the policy; `version` stands for that.
@@ -64,8 +67,11 @@ impl Heatmap<'_> {
             before => {
                 // The buffers of the picture before serve again.
                 let mut mesh = before.and_then(|(_, mesh)| Arc::into_inner(mesh)).unwrap_or_default();
+                let pen = pictures.pen.get_or_insert_with(|| Pen::new(ui.ctx()));
                 mesh.clear();
-                self.tessellate(ui, rect, cell, &mut mesh);
+                mesh.texture_id = TextureId::default();
+                self.tessellate(ui, rect, cell, pen, &mut mesh);
+                mesh.texture_id = pen.texture();
                 Arc::new(mesh)
             }
         };
@@ -111,67 +117,36 @@ impl Heatmap<'_> {
         Rect::from_min_size(rect.min + cell * vec2(col as f32, row as f32), cell)
     }
 
-    fn tessellate(&self, ui: &Ui, rect: Rect, cell: Vec2, mesh: &mut Mesh) {
+    fn tessellate(&self, ui: &Ui, rect: Rect, cell: Vec2, pen: &Pen, mesh: &mut Mesh) {
         let palette = Palette::of(ui);
         let options = ui.ctx().tessellation_options(|options| *options);
-        let mut tessellator = Tessellator::new(
-            ui.ctx().pixels_per_point(),
-            options,
-            ui.ctx().fonts(|fonts| fonts.font_image_size()),
-            vec![],
-        );
-        let mut add = |shape: Shape| tessellator.tessellate_shape(shape, mesh);
+        let pixels_per_point = ui.ctx().pixels_per_point();
+        let font_size = ui.ctx().fonts(|fonts| fonts.font_image_size());
+        let mut tessellator = Tessellator::new(pixels_per_point, options, font_size, vec![]);
         let colors = &COLOR_MAPS[self.color_map];
         // The ground, or what the colours have for it, shows between cells as a thin line, where there is room for one.
-        add(Shape::rect_filled(rect, 0.0, colors.lines.map_or(palette.ground, rgb)));
+        mesh.add_colored_rect(rect.round_to_pixels(pixels_per_point), colors.lines.map_or(palette.ground, rgb));
         let gap = if cell.x >= 12.0 { 0.5 } else { 0.0 };
         for state in 0..self.grid.cells() {
-            let place = self.cell_rect(rect, cell, state).shrink(gap);
+            let place = self.cell_rect(rect, cell, state).shrink(gap).round_to_pixels(pixels_per_point);
             if self.grid.is_wall(state) {
-                add(Shape::rect_filled(place, 0.0, palette.wall));
+                mesh.add_colored_rect(place, palette.wall);
                 // Struck through: no colour map may take a wall for a cell.
                 let across = [place.left_bottom(), place.right_top()];
-                add(Shape::line_segment(across, Stroke::new((0.05 * cell.x).max(0.7), palette.muted)));
+                let stroke = Stroke::new((0.05 * cell.x).max(0.7), palette.muted);
+                tessellator.tessellate_line_segment(across, stroke, mesh);
                 continue;
             }
             let color = colors.of_steps(f64::from(self.policy.hitting_time[state]));
-            add(Shape::rect_filled(place, 0.0, rgb(color)));
+            mesh.add_colored_rect(place, rgb(color));
             let ink = rgb(colors.ink_on(color));
             if state == self.grid.goal() {
-                flag(place, ink).into_iter().for_each(&mut add);
+                flag(place, ink).into_iter().for_each(|shape| tessellator.tessellate_shape(shape, mesh));
             } else {
-                arrows(place, &self.policy.policy[state], ink).into_iter().for_each(&mut add);
+                pen.arrows(mesh, place, &self.policy.policy[state], ink, pixels_per_point);
             }
         }
     }
-}
-
-/// An arrow for every move, its length the move's probability; a dot for Stay.
-fn arrows(cell: Rect, policy: &[f32; 5], ink: Color32) -> Vec<Shape> {
-    let size = cell.width().min(cell.height());
-    let center = cell.center();
-    let width = (size * 0.06).max(1.0);
-    let mut shapes = Vec::new();
-    for (action, &p) in Action::ALL.into_iter().zip(policy) {
-        // What is rarer than one time in thirty would be a speck.
-        if p < 0.03 {
-            continue;
-        }
-        if action == Action::Stay {
-            shapes.push(Shape::circle_filled(center, size * 0.17 * p.sqrt(), ink));
-            continue;
-        }
-        let (down, right) = action.direction();
-        let along = vec2(right as f32, down as f32);
-        let across = along.rot90();
-        let head = size * 0.16 * p.sqrt().min(2.0 * p);
-        let tip = center + along * size * 0.46 * p;
-        let neck = tip - along * head;
-        shapes.push(Shape::line_segment([center, neck], Stroke::new(width, ink)));
-        let wing = across * head * 0.7;
-        shapes.push(Shape::convex_polygon(vec![tip, neck + wing, neck - wing], ink, Stroke::NONE));
-    }
-    shapes
 }
 
 /// The goal: a flag.

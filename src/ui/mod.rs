@@ -6,11 +6,12 @@
 //! - toolbar, headline, controls, board (panels, chart, timeline, inspector), compare, help: the parts of the page.
 //! - slow_clones: clones in the panels that take too long for a frame. lesson, world: tabs of their own. policy_table: the heatmaps as text. export: what a visitor takes away.
 //! - experiments: the tabs beside training. export: pictures, curve and model as texts. host: files, which a browser and a window give in different ways.
-//! - heatmap: one policy on one grid. chart, table: figures over figures. theme: every colour, font and distance. numbers: how they are written.
+//! - heatmap: one policy on one grid; arrows: its arrows. chart, table: figures over figures. theme: every colour, font and distance. numbers: how they are written.
 //!   math: equations. widgets: small pieces that several parts use. focus: the ring around what the keyboard acts on.
 
 mod address;
 mod app;
+mod arrows;
 mod board;
 mod chart;
 mod commands;
