@@ -14,6 +14,8 @@
   let awakeUntil = 0;
   let timer;
   let alarm = Infinity;
+  /** Until then news is awaited: frames that nobody but egui asks for come after it. */
+  let heldUntil = 0;
 
   /** Where somebody asks for it, every frame is measured (User Timing). */
   const measured = (callback) => (time) => {
@@ -23,9 +25,10 @@
   };
 
   window.requestAnimationFrame = (callback) => {
-    if (performance.now() < awakeUntil) return request(measured(callback));
+    const now = performance.now();
+    if (now < awakeUntil && now >= heldUntil) return request(measured(callback));
     waiting = callback;
-    wakeIn(REST);
+    wakeIn(now < heldUntil ? heldUntil - now : REST);
     return 0;
   };
 
@@ -56,6 +59,17 @@
 
   /** There will be something to paint in so many milliseconds (src/web/page.rs). */
   window.wakePage = (delay) => (delay > 0 ? wakeIn(Math.min(delay, REST)) : wake(LONG));
+
+  /** There will be news in so many milliseconds, or later (src/web/worker.rs). */
+  window.holdPage = (most) => (heldUntil = performance.now() + most);
+
+  /** There is news; whether it is to be painted now. Where more is awaited, some can wait. */
+  window.tellPage = (canWait) => {
+    if (canWait && performance.now() < heldUntil) return false;
+    heldUntil = 0;
+    wake(LONG);
+    return true;
+  };
 
   const HAPPENINGS =
     "pointerdown pointerup pointermove pointercancel mousemove mouseleave touchstart touchmove touchend touchcancel " +

@@ -18,6 +18,20 @@ use crate::lab::{Command, Event, Hand, Link, PROTOCOL, Pace, Pool, Session, Task
 const SESSION: &str = "session";
 const TASKS: &str = "tasks";
 
+/// How long the page paints nothing but what its visitor does, to leave the machine to a retraining, in milliseconds.
+const HOLD: f64 = 100.0;
+
+#[wasm_bindgen]
+extern "C" {
+    /// Says that news is awaited, for so many milliseconds at most (web/rest.js).
+    #[wasm_bindgen(js_name = holdPage)]
+    fn hold_page(most: f64);
+
+    /// Says that there is news; whether it is to be painted now (web/rest.js).
+    #[wasm_bindgen(js_name = tellPage)]
+    fn tell_page(can_wait: bool) -> bool;
+}
+
 /// A worker, and what it has said: messages of type `E`.
 struct Line<E> {
     worker: Option<Worker>,
@@ -34,8 +48,8 @@ struct Handlers {
 impl<E: DeserializeOwned + 'static> Line<E> {
     const SCRIPT: &str = "./worker_loader.js";
 
-    /// Starts a worker of this name; `wake` is called when a message has arrived.
-    fn open(name: &str, wake: Rc<dyn Fn()>) -> Line<E> {
+    /// Starts a worker of this name; `wake` is called with each message that arrives.
+    fn open(name: &str, wake: Rc<dyn Fn(&Result<E, String>)>) -> Line<E> {
         let mut line = Line { worker: None, inbox: Rc::default(), handlers: None };
         let options = WorkerOptions::new();
         options.set_name(name);
@@ -50,8 +64,8 @@ impl<E: DeserializeOwned + 'static> Line<E> {
         let deliver = {
             let inbox = line.inbox.clone();
             move |event: Result<E, String>| {
+                wake(&event);
                 inbox.borrow_mut().push_back(event);
-                wake();
             }
         };
         let on_error = deliver.clone();
@@ -111,16 +125,21 @@ impl<E> Drop for Line<E> {
 
 /// The page's end of the session.
 pub struct WorkerLink {
-    wake: Rc<dyn Fn()>,
+    wake: Rc<dyn Fn(&Result<Event, String>)>,
     line: Line<Event>,
     /// Run and update of the snapshot that has come last.
     latest: Option<(u32, u32)>,
 }
 
 impl WorkerLink {
-    /// Starts the worker; `wake` is called when an event has arrived.
+    /// Starts the worker; `wake` is called when an event has arrived that is to be painted.
     pub fn new(wake: impl Fn() + 'static) -> WorkerLink {
-        let wake: Rc<dyn Fn()> = Rc::new(wake);
+        let wake: Rc<dyn Fn(&Result<Event, String>)> = Rc::new(move |event| {
+            // A run that has begun has nothing to show yet.
+            if tell_page(matches!(event, Ok(Event::Started(_)))) {
+                wake();
+            }
+        });
         WorkerLink { line: Line::open(SESSION, wake.clone()), wake, latest: None }
     }
 }
@@ -129,6 +148,9 @@ impl Link for WorkerLink {
     fn send(&mut self, command: &Command) {
         if let (Command::Seen(_), Some((run, update))) = (command, self.latest) {
             measures::shown(run, update);
+        }
+        if let Command::Retrain { .. } = command {
+            hold_page(HOLD);
         }
         self.line.send(command);
     }
@@ -148,7 +170,7 @@ impl Link for WorkerLink {
 
 /// A pool of workers, one for each core: while they work the session mostly rests.
 pub fn worker_pool(wake: impl Fn() + 'static) -> Pool {
-    let wake: Rc<dyn Fn()> = Rc::new(wake);
+    let wake: Rc<dyn Fn(&Result<TaskEvent, String>)> = Rc::new(move |_| wake());
     let cores = web_sys::window().map_or(1.0, |window| window.navigator().hardware_concurrency());
     Pool::new(cores as usize, move || {
         Box::new(WorkerHand { wake: wake.clone(), line: None, is_ready: false, next: None })
@@ -157,7 +179,7 @@ pub fn worker_pool(wake: impl Fn() + 'static) -> Pool {
 
 /// A worker that does tasks.
 struct WorkerHand {
-    wake: Rc<dyn Fn()>,
+    wake: Rc<dyn Fn(&Result<TaskEvent, String>)>,
     line: Option<Line<TaskEvent>>,
     is_ready: bool,
     /// A task for when the worker listens.
