@@ -8,7 +8,7 @@ use super::observer::Memory;
 use super::pg_ape::PgApe;
 use super::softmax::softmax;
 use super::{AlgorithmKind, Config, ConfigError, Contexts, Ensemble};
-use crate::mdp::{ACTIONS, Grid, Policy};
+use crate::mdp::{ACTIONS, Grid};
 
 /// What every algorithm holds: the experts, where and how they train.
 #[derive(Clone)]
@@ -34,9 +34,14 @@ impl Experts {
     }
 
     /// θ ← θ + α_θ ∇J(θ), with the bonus on the entropy of the policies where they went: `visited` is the share of
-    /// visits to the pair (context, state) of this number, `weight` that of the bonus. `ensemble`: the experts as
-    /// they are now.
-    pub fn ascend(&mut self, ensemble: &Ensemble, mut gradient: Vec<f64>, weight: f64, visited: impl Fn(usize) -> f64) {
+    /// visits to a context and a state, `weight` that of the bonus. `ensemble`: the experts as they are now.
+    pub fn ascend(
+        &mut self,
+        ensemble: &Ensemble,
+        mut gradient: Vec<f64>,
+        weight: f64,
+        visited: impl Fn(usize, usize) -> f64,
+    ) {
         if weight > 0.0 {
             add_entropy_bonus(&self.logits, ensemble, weight, visited, &mut gradient);
         }
@@ -194,18 +199,19 @@ fn dual_ascent(beta: f64, ensemble_return: f64, alpha: f64) -> f64 {
 }
 
 /// Adds `weight` times the gradient of the mean entropy of the policies where they went: `visited` is the share
-/// of visits to the pair (context, state) of this number.
+/// of visits to a context and a state.
 fn add_entropy_bonus(
     logits: &[f64],
     ensemble: &Ensemble,
     weight: f64,
-    visited: impl Fn(usize) -> f64,
+    visited: impl Fn(usize, usize) -> f64,
     gradient: &mut [f64],
 ) {
-    let experts = ensemble.policies().iter().flat_map(Policy::rows);
-    let rows = logits.as_chunks::<ACTIONS>().0.iter().zip(gradient.as_chunks_mut::<ACTIONS>().0).enumerate();
-    for (pi, (pair, (logits, gradient))) in experts.zip(rows) {
-        let weight = weight * visited(pair);
+    let experts = ensemble.policies().iter().enumerate();
+    let places = experts.flat_map(|(context, policy)| policy.rows().iter().enumerate().map(move |row| (context, row)));
+    let rows = logits.as_chunks::<ACTIONS>().0.iter().zip(gradient.as_chunks_mut::<ACTIONS>().0);
+    for ((context, (state, pi)), (logits, gradient)) in places.zip(rows) {
+        let weight = weight * visited(context, state);
         if weight == 0.0 {
             continue;
         }

@@ -13,7 +13,7 @@ use crate::mdp::{ACTIONS, ActionDraw, Draw, Grid, one_of};
 /// Most walkers at once: more would not fit into a processor's registers.
 pub const WALKERS: usize = 4;
 
-/// A step in four bytes: below, the number of its (context, state, action), `(c · S + s) · 5 + a`; above, how many
+/// A step in four bytes: below, the number of its (state, context, action), `(s · n + c) · 5 + a`; above, how many
 /// steps of its episode came before.
 #[derive(Clone, Copy, Default)]
 pub struct Step(u32);
@@ -33,23 +33,17 @@ impl Step {
     }
 }
 
-/// What happens at a pair (context, state), all in one place.
-#[derive(Clone, Copy)]
-#[repr(align(32))]
-struct Row {
-    actions: ActionDraw,
-    /// The place that each executed action leads to, padded; [`Course::GOAL`] for the goal.
-    next: [u16; 8],
-}
-
-/// Where episodes are played, and by which policies. A place is a state, or for the ensemble, whose episodes keep their
-/// expert, a pair (context, state), `c · S + s`.
+/// Where episodes are played, and by which policies. A place is a state times n: the number of its first pair (state,
+/// context), `s · n + c`.
 pub struct Course {
-    /// `[n][S]`.
-    rows: Vec<Row>,
+    /// `[S][n]`.
+    actions: Vec<ActionDraw>,
+    /// The place that each executed action leads to, by the set of those before it; [`Course::GOAL`] for the goal. At each
+    /// state's place; what is between them is not used.
+    next: Vec<[u16; ActionDraw::SETS]>,
     /// Places where an episode may start.
     starts: Vec<u32>,
-    cells: usize,
+    experts: usize,
     slip: Draw<1>,
     is_slippery: bool,
     /// Where a walker's clock is when its time is over.
@@ -59,23 +53,20 @@ pub struct Course {
 impl Course {
     const GOAL: u16 = u16::MAX;
 
-    /// Episodes of at most `horizon` steps, below 2¹⁶. They keep their expert, or draw one at each step.
-    pub fn new(grid: &Grid, experts: usize, keeps_expert: bool, horizon: u32) -> Course {
-        let first = |context: usize| if keeps_expert { context * grid.cells() } else { 0 };
-        let row = |pair: usize| {
-            let (context, state) = (pair / grid.cells(), pair % grid.cells());
-            let next = std::array::from_fn(|action| {
-                let next = grid.next(state)[action.min(ACTIONS - 1)] as usize;
-                if next == grid.goal() { Self::GOAL } else { (first(context) + next) as u16 }
-            });
-            Row { actions: ActionDraw::new(&[1.0]), next }
+    /// Episodes of at most `horizon` steps, below 2¹⁶.
+    pub fn new(grid: &Grid, experts: usize, horizon: u32) -> Course {
+        let next = |pair: usize| {
+            std::array::from_fn(|passed| {
+                let next = grid.next(pair / experts)[ActionDraw::after(passed)] as usize;
+                if next == grid.goal() { Self::GOAL } else { (next * experts) as u16 }
+            })
         };
-        let contexts = if keeps_expert { experts } else { 1 };
-        let places = |&state: &u32| (0..contexts).map(move |context| first(context) as u32 + state);
+        let pairs = grid.cells() * experts;
         Course {
-            rows: (0..experts * grid.cells()).map(row).collect(),
-            starts: grid.starts().iter().flat_map(places).collect(),
-            cells: grid.cells(),
+            actions: vec![ActionDraw::new(&[1.0]); pairs],
+            next: (0..pairs).map(next).collect(),
+            starts: grid.starts().iter().map(|&state| state * experts as u32).collect(),
+            experts,
             slip: Draw::new(&[1.0 - grid.slip(), grid.slip()]),
             is_slippery: grid.slip() > 0.0,
             end: horizon * Step::TICK,
@@ -84,17 +75,19 @@ impl Course {
 
     /// From now on these are the experts.
     pub fn set(&mut self, ensemble: &Ensemble) {
-        for (policy, rows) in ensemble.policies().iter().zip(self.rows.chunks_mut(self.cells)) {
-            policy.rows().iter().zip(rows).for_each(|(pi, row)| row.actions = ActionDraw::new(pi));
+        for (context, policy) in ensemble.policies().iter().enumerate() {
+            let draws = self.actions[context..].iter_mut().step_by(self.experts);
+            policy.rows().iter().zip(draws).for_each(|(pi, draw)| *draw = ActionDraw::new(pi));
         }
     }
 
-    /// Where an episode begins. Not often, so it is kept out of the way.
+    /// Where an episode begins, and which expert is drawn for it. Not often, so it is kept out of the way.
     #[cold]
     #[inline(never)]
-    fn start(&self, starts: &mut Starts<impl Rng>) -> usize {
+    fn start(&self, starts: &mut Starts<impl Rng>) -> Walker {
         starts.drawn = starts.drawn.wrapping_add(1);
-        self.starts[one_of(self.starts.len(), starts.rng.next_u32())] as usize
+        let drawn = one_of(self.starts.len() * self.experts, starts.rng.next_u32());
+        Walker { place: self.starts[drawn / self.experts] as usize, context: drawn % self.experts, clock: 0 }
     }
 }
 
@@ -127,25 +120,25 @@ pub trait Player {
     /// Whether that takes 32 random bits.
     const DRAWS: bool;
 
-    /// The pair (context, state), `c · S + s`, whose policy acts at a place.
-    fn pair(&self, place: usize, bits: u32) -> usize;
+    /// The context that acts at a place, in an episode that this expert was drawn for.
+    fn context(&self, place: usize, drawn: usize, bits: u32) -> usize;
 }
 
-/// The ensemble: the expert was drawn with the start.
+/// The ensemble: an expert acts for all of an episode.
 pub struct EnsemblePlayer;
 
 impl Player for EnsemblePlayer {
     const DRAWS: bool = false;
 
     #[inline(always)]
-    fn pair(&self, place: usize, _bits: u32) -> usize {
-        place
+    fn context(&self, _place: usize, drawn: usize, _bits: u32) -> usize {
+        drawn
     }
 }
 
 /// The clone: the expert is drawn anew at each step. Of `ENDS` + 1 experts at most.
 pub struct ClonePlayer<const ENDS: usize> {
-    /// `[S]`.
+    /// By place: `[S][n]`, the same for all n.
     pub contexts: Vec<Draw<ENDS>>,
 }
 
@@ -153,8 +146,8 @@ impl<const ENDS: usize> Player for ClonePlayer<ENDS> {
     const DRAWS: bool = true;
 
     #[inline(always)]
-    fn pair(&self, place: usize, bits: u32) -> usize {
-        self.contexts[place].outcome(bits) * self.contexts.len() + place
+    fn context(&self, place: usize, _drawn: usize, bits: u32) -> usize {
+        self.contexts[place].outcome(bits)
     }
 }
 
@@ -170,13 +163,13 @@ pub trait RememberingPlayer {
     fn acted(&mut self, state: usize, action: usize);
 }
 
-/// A pair that is known.
+/// A context that is known.
 struct Known(usize);
 
 impl Player for Known {
     const DRAWS: bool = false;
 
-    fn pair(&self, _place: usize, _bits: u32) -> usize {
+    fn context(&self, _place: usize, _drawn: usize, _bits: u32) -> usize {
         self.0
     }
 }
@@ -185,15 +178,13 @@ impl Player for Known {
 #[derive(Clone, Copy, Default)]
 struct Walker {
     place: usize,
+    /// The expert that was drawn for its episode.
+    context: usize,
     /// Steps of its episode so far, in ticks.
     clock: u32,
 }
 
 impl Walker {
-    fn begin(course: &Course, luck: &mut Luck<impl Rng>) -> Walker {
-        Walker { place: course.start(&mut luck.starts), clock: 0 }
-    }
-
     /// One step; after an episode's last, a new one begins.
     #[inline(always)]
     fn step<const SLIPS: bool>(
@@ -204,21 +195,21 @@ impl Walker {
         steps: &mut impl Rng,
         starts: &mut Starts<impl Rng>,
     ) -> Step {
-        let pair = player.pair(self.place, (bits >> 32) as u32);
-        let row = &course.rows[pair];
-        let action = row.actions.outcome(bits as u32);
-        let mut executed = action;
+        let pair = self.place + player.context(self.place, self.context, (bits >> 32) as u32);
+        let passed = course.actions[pair].passed(bits as u32);
+        let action = ActionDraw::after(passed);
+        let mut executed = passed;
         if SLIPS {
             let bits = steps.next_u64();
-            let other = one_of(ACTIONS, bits as u32);
-            executed = if course.slip.outcome((bits >> 32) as u32) == 1 { other } else { action };
+            let other = (1 << one_of(ACTIONS, bits as u32)) - 1;
+            executed = if course.slip.outcome((bits >> 32) as u32) == 1 { other } else { passed };
         }
         let step = Step((pair * ACTIONS + action) as u32 + self.clock);
-        let next = row.next[executed];
+        let next = course.next[self.place][executed % ActionDraw::SETS];
         self.place = usize::from(next);
         self.clock += Step::TICK;
         if (next == Course::GOAL) | (self.clock == course.end) {
-            *self = Walker { place: course.start(starts), clock: 0 };
+            *self = course.start(starts);
         }
         step
     }
@@ -262,7 +253,7 @@ impl Batch {
         let rounds = if is_much { wanted.div_ceil(WALKERS as u32) as usize } else { 0 };
         self.rows.resize(rounds, [Step::default(); WALKERS]);
         let before = luck.starts.drawn;
-        let [mut a, mut b, mut c, mut d] = [(); WALKERS].map(|()| Walker::begin(course, luck));
+        let [mut a, mut b, mut c, mut d] = [(); WALKERS].map(|()| course.start(&mut luck.starts));
         // A copy close at hand, which stays in registers.
         let mut steps = luck.steps.clone();
         for row in &mut self.rows {
@@ -302,18 +293,18 @@ impl Batch {
         self.tails.iter_mut().for_each(Vec::clear);
         let before = luck.starts.drawn;
         let tail = &mut self.tails[0];
-        let mut walker = Walker::begin(course, luck);
+        let mut walker = course.start(&mut luck.starts);
         while walker.clock > 0 || tail.len() < wanted as usize {
             if walker.clock == 0 {
                 player.begin();
             }
-            let state = walker.place;
+            let state = walker.place / course.experts;
             let bits = luck.steps.next_u64();
-            let pair = Known(player.context(state, (bits >> 32) as u32) * course.cells + state);
+            let known = Known(player.context(state, (bits >> 32) as u32));
             let step = if course.is_slippery {
-                walker.step::<true>(course, &pair, bits, &mut luck.steps, &mut luck.starts)
+                walker.step::<true>(course, &known, bits, &mut luck.steps, &mut luck.starts)
             } else {
-                walker.step::<false>(course, &pair, bits, &mut luck.steps, &mut luck.starts)
+                walker.step::<false>(course, &known, bits, &mut luck.steps, &mut luck.starts)
             };
             player.acted(state, step.entry() % ACTIONS);
             tail.push(step);
@@ -351,7 +342,7 @@ mod tests {
         let grid = Grid::new(GridSpec { rows: 4, cols: 5, goal: (3, 0), walls, slip: 0.0 }).unwrap();
         let (experts, horizon) = (3, 20);
         let uniform = Policy::from_rows(vec![[0.2; ACTIONS]; grid.cells()]);
-        let mut course = Course::new(&grid, experts, true, horizon);
+        let mut course = Course::new(&grid, experts, horizon);
         course.set(&Ensemble::new(vec![uniform; experts]));
         let mut luck = Luck::new(1);
         let mut batch = Batch::default();
@@ -366,7 +357,7 @@ mod tests {
                 at_work += usize::from(walk.peek().is_some());
                 for step in walk {
                     let (pair, action) = (step.entry() / ACTIONS, step.entry() % ACTIONS);
-                    let (expert, state) = (pair / grid.cells(), pair % grid.cells());
+                    let (state, expert) = (pair / experts, pair % experts);
                     match before {
                         Some(before) => assert_eq!((before.0, before.1, before.2 + 1), (expert, state, step.time())),
                         None => assert!(step.time() == 0 && grid.starts().contains(&(state as u32))),

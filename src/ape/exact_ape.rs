@@ -161,7 +161,8 @@ impl Algorithm for ExactApe {
         let (experts, clone) = visits.split_at(self.experts.config.experts as usize * self.experts.grid.cells());
         let (all, by_clone) = (experts.iter().sum::<f64>(), clone.iter().sum::<f64>());
         let n = f64::from(self.experts.config.experts);
-        let visited = |pair: usize| experts[pair] / all + clone[pair % clone.len()] / by_clone / n;
+        let visited =
+            |context: usize, state: usize| experts[context * clone.len() + state] / all + clone[state] / by_clone / n;
         let weight = Self::EXPLORATION * self.experts.config.entropy_weight(self.experts.updates);
         self.experts.ascend(&ensemble, logits, weight, visited);
         ensemble_return

@@ -21,8 +21,8 @@ use crate::mdp::{ACTIONS, Draw, Grid};
 /// What one update plays. The next begins anew, so that a copy of it is empty.
 #[derive(Default)]
 struct Played {
-    /// Of the ensemble and of the clone; made when first needed.
-    courses: Option<[Course; 2]>,
+    /// Made when first needed.
+    course: Option<Course>,
     batch: Batch,
     ensemble_tally: Tally,
     clone_tally: Tally,
@@ -54,7 +54,7 @@ pub struct PgApe {
     values_adam: Adam,
     /// What the return after step t counts for `from_start`, γᵗ: `[T]`. For `from_step` all count the same.
     weights: Option<Vec<f64>>,
-    /// r̃ by entry, `[n][S][5]`, where the clone's reward is not the experts'.
+    /// r̃ by entry, `[S][n][5]`, where the clone's reward is not the experts'.
     adversary_reward: Option<Vec<f64>>,
     played: Played,
 }
@@ -70,7 +70,8 @@ impl PgApe {
         };
         let weight = |step| libm::pow(config.discount, step as f64);
         let weights = (config.return_to_go == ReturnToGo::FromStart).then(|| (0..horizon).map(weight).collect());
-        let by_entry = |reward: &AdversaryReward| reward.table(&grid).as_flattened().repeat(experts);
+        let by_entry =
+            |reward: &AdversaryReward| reward.table(&grid).iter().flat_map(|rewards| rewards.repeat(experts)).collect();
         PgApe {
             luck: Luck::new(config.seed),
             observer: config.observer.build(&grid, experts),
@@ -97,10 +98,9 @@ impl PgApe {
     fn play_ensemble(&mut self, ensemble: &Ensemble) {
         let Config { batch_steps, discount, observer, horizon, .. } = self.experts.config;
         let Experts { grid, .. } = &self.experts;
-        let new = || [true, false].map(|keeps_expert| Course::new(grid, ensemble.experts(), keeps_expert, horizon));
-        let courses = self.played.courses.get_or_insert_with(new);
-        courses.iter_mut().for_each(|course| course.set(ensemble));
-        self.played.batch.play(&courses[0], &EnsemblePlayer, batch_steps, &mut self.luck);
+        let course = self.played.course.get_or_insert_with(|| Course::new(grid, ensemble.experts(), horizon));
+        course.set(ensemble);
+        self.played.batch.play(course, &EnsemblePlayer, batch_steps, &mut self.luck);
         let rewards = Rewards { discount, by_entry: None, weights: self.weights.as_deref() };
         self.played.ensemble_tally.count(self.experts.logits.len(), &self.played.batch, rewards);
         if observer.model().learns {
@@ -110,7 +110,7 @@ impl PgApe {
 
     /// Shows the observer the episodes of the batch.
     fn show(&mut self) {
-        let cells = self.experts.grid.cells();
+        let experts = self.experts.config.experts as usize;
         let (mut context, mut states) = (0, Vec::new());
         for walk in self.played.batch.walks() {
             for step in walk {
@@ -119,8 +119,8 @@ impl PgApe {
                     states.clear();
                 }
                 let pair = step.entry() / ACTIONS;
-                context = pair / cells;
-                states.push((pair % cells) as u32);
+                context = pair % experts;
+                states.push((pair / experts) as u32);
             }
             if !states.is_empty() {
                 self.observer.saw(context, &states);
@@ -133,7 +133,7 @@ impl PgApe {
     /// before.
     fn play_clone(&mut self, ensemble: &Ensemble, contexts: &Contexts) {
         let Config { batch_steps, discount, .. } = self.experts.config;
-        let Played { courses: Some([_, course]), batch, clone_tally, .. } = &mut self.played else { return };
+        let Played { course: Some(course), batch, clone_tally, .. } = &mut self.played else { return };
         match (self.observer.memory(ensemble), ensemble.experts()) {
             (Some(memory), n) => {
                 let mut player = Remembering { memory: &*memory, remembered: Vec::new(), p: vec![0.0; n] };
@@ -151,7 +151,8 @@ impl PgApe {
     /// G₁ + G₂ (paper, Eqs. 5–7).
     fn policy_gradient(&self, ensemble: &Ensemble, contexts: &Contexts) -> Vec<f64> {
         let (beta, cells) = (self.experts.config.beta, self.experts.grid.cells());
-        let pairs = self.experts.config.experts as usize * cells;
+        let experts = self.experts.config.experts as usize;
+        let pairs = experts * cells;
         // ∂J/∂log π_c(a|s), `[n][S][5]`: Σ over a tally's entries of one (context, state), the returns, times `scale`,
         // less a baseline.
         let mut scores = vec![[0.0; ACTIONS]; pairs];
@@ -162,8 +163,12 @@ impl PgApe {
         };
         // G₁ = 1/N₁ Σ ∇ log π_c(a|s) Ã(t), Ã(t) = R(t) − Ṽ_c(s).
         let scale = 1.0 / self.played.ensemble_tally.episodes;
-        for ((score, tally), value) in scores.iter_mut().zip(self.played.ensemble_tally.by_pair()).zip(&self.values) {
-            add(score, tally, scale, scale * value);
+        let tallies = self.played.ensemble_tally.by_pair();
+        for (context, scores) in scores.chunks_mut(cells).enumerate() {
+            let values = &self.values[context * cells..];
+            for ((score, tallies), value) in scores.iter_mut().zip(tallies.chunks(experts)).zip(values) {
+                add(score, &tallies[context], scale, scale * value);
+            }
         }
         // G₂ = 1/N₂ Σ ∇ log π_o(a|s) Ã(t), Ã(t) = −βR(t) − Ṽ_o(s).
         let tallies = self.played.clone_tally.by_pair();
@@ -171,12 +176,14 @@ impl PgApe {
         let kind = self.experts.config.baseline;
         match self.experts.config.gradient {
             GradientKind::SampledContext => {
-                for (pair, (score, tally)) in scores.iter_mut().zip(tallies).enumerate() {
-                    let baseline = match kind {
-                        BaselineKind::Joint => self.values[pair],
-                        BaselineKind::Separate => -beta * self.values[pairs + pair % cells],
+                for (context, scores) in scores.chunks_mut(cells).enumerate() {
+                    let (values, factor) = match kind {
+                        BaselineKind::Joint => (&self.values[context * cells..], 1.0),
+                        BaselineKind::Separate => (&self.values[pairs..], -beta),
                     };
-                    add(score, tally, -beta * scale, scale * baseline);
+                    for ((score, tallies), value) in scores.iter_mut().zip(tallies.chunks(experts)).zip(values) {
+                        add(score, &tallies[context], -beta * scale, scale * (factor * value));
+                    }
                 }
             }
             GradientKind::Mixture => {
@@ -192,7 +199,7 @@ impl PgApe {
                     let mut advantage = [0.0; ACTIONS];
                     let mut mixed = [0.0; ACTIONS];
                     for (c, p) in p.iter().enumerate() {
-                        add(&mut advantage, &tallies[c * cells + state], -beta * scale, scale * baseline);
+                        add(&mut advantage, &tallies[state * experts + c], -beta * scale, scale * baseline);
                         mixed.iter_mut().zip(ensemble.policies()[c].row(state)).for_each(|(sum, pi)| *sum += p * pi);
                     }
                     for (c, p) in p.iter().enumerate() {
@@ -219,20 +226,26 @@ impl PgApe {
     /// −∇J(φ) (paper, Eq. 4): the way down the squared error of the baselines, per episode.
     fn value_gradient(&self) -> Vec<f64> {
         let Config { beta, value_weight, baseline, .. } = self.experts.config;
-        let (pairs, cells) = (self.played.ensemble_tally.pairs.len(), self.experts.grid.cells());
-        let fit = |tally: &Tally, pair: usize, scale: f64, value: f64| {
-            let [count, returns] = tally.pairs[pair];
-            value_weight / tally.episodes * (scale * returns - count * value)
+        let (experts, cells) = (self.experts.config.experts as usize, self.experts.grid.cells());
+        let pairs = experts * cells;
+        let [by_ensemble, by_clone] = [&self.played.ensemble_tally, &self.played.clone_tally]
+            .map(|tally| (&tally.pairs[..], value_weight / tally.episodes));
+        let fit = |(tally, weight): (&[[f64; 2]], f64), pair: usize, scale: f64, value: f64| {
+            let [count, returns] = tally[pair];
+            weight * (scale * returns - count * value)
         };
         let mut gradient = vec![0.0; self.values.len()];
-        for pair in 0..pairs {
-            gradient[pair] += fit(&self.played.ensemble_tally, pair, 1.0, self.values[pair]);
-            // A baseline of its own is fitted to R itself, so that β can change while it trains.
-            let (index, scale) = match baseline {
-                BaselineKind::Joint => (pair, -beta),
-                BaselineKind::Separate => (pairs + pair % cells, 1.0),
-            };
-            gradient[index] += fit(&self.played.clone_tally, pair, scale, self.values[index]);
+        for context in 0..experts {
+            for state in 0..cells {
+                let (pair, index) = (state * experts + context, context * cells + state);
+                gradient[index] += fit(by_ensemble, pair, 1.0, self.values[index]);
+                // A baseline of its own is fitted to R itself, so that β can change while it trains.
+                let (index, scale) = match baseline {
+                    BaselineKind::Joint => (index, -beta),
+                    BaselineKind::Separate => (pairs + state, 1.0),
+                };
+                gradient[index] += fit(by_clone, pair, scale, self.values[index]);
+            }
         }
         gradient
     }
@@ -242,7 +255,7 @@ const MOST_ENDS: usize = Config::MAX_EXPERTS as usize - 1;
 
 /// The clone by p(c|s).
 fn blind<const ENDS: usize>(contexts: &Contexts) -> ClonePlayer<ENDS> {
-    ClonePlayer { contexts: contexts.rows().map(Draw::new).collect() }
+    ClonePlayer { contexts: contexts.rows().flat_map(|p| std::iter::repeat_n(Draw::new(p), p.len())).collect() }
 }
 
 /// The clone by p(c|τ).
@@ -310,8 +323,12 @@ impl Algorithm for PgApe {
         // 4: gradient update on the experts, θ ← θ + α_θ ∇J(θ).
         let gradient = self.policy_gradient(&ensemble, &contexts);
         let value_gradient = self.value_gradient();
-        let share = |tally: &Tally, pair: usize| tally.pairs[pair][0] / tally.steps;
-        let visited = |pair| share(&self.played.ensemble_tally, pair) + share(&self.played.clone_tally, pair);
+        let experts = ensemble.experts();
+        let [by_ensemble, by_clone] = [&self.played.ensemble_tally, &self.played.clone_tally];
+        let visited = |context: usize, state: usize| {
+            let share = |tally: &Tally| tally.pairs[state * experts + context][0] / tally.steps;
+            share(by_ensemble) + share(by_clone)
+        };
         self.experts.ascend(&ensemble, gradient, self.experts.config.entropy_weight(self.experts.updates), visited);
         // 5: update of the value function, φ ← φ − α_φ ∇J(φ).
         self.values_adam.ascend(&mut self.values, &value_gradient, self.experts.config.learning_rate);

@@ -7,7 +7,7 @@ use crate::mdp::ACTIONS;
 #[derive(Clone, Copy)]
 pub struct Rewards<'a> {
     pub discount: f64,
-    /// By entry, `[n][S][5]`; −1 a step where there is none.
+    /// By entry, `[S][n][5]`; −1 a step where there is none.
     pub by_entry: Option<&'a [f64]>,
     /// What the return after step t counts, `[T]`, where that is not 1.
     pub weights: Option<&'a [f64]>,
@@ -15,16 +15,16 @@ pub struct Rewards<'a> {
 
 #[derive(Default)]
 pub struct Tally {
-    /// `[n][S][5]`: how often each action was taken, and the sum of the returns R(t) that followed.
+    /// `[S][n][5]`: how often each action was taken, and the sum of the returns R(t) that followed.
     entries: Vec<[f64; 2]>,
-    /// `[n][S]`: the same summed over actions.
+    /// `[S][n]`: the same summed over actions.
     pub pairs: Vec<[f64; 2]>,
     pub episodes: f64,
     pub steps: f64,
 }
 
 impl Tally {
-    /// `[n][S]`, the entries of each pair (context, state).
+    /// `[S][n]`, the entries of each pair (state, context).
     pub fn by_pair(&self) -> &[[[f64; 2]; ACTIONS]] {
         self.entries.as_chunks().0
     }

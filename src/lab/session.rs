@@ -19,7 +19,7 @@ const IN_FLIGHT: usize = 2;
 /// How long the page may owe an answer before training waits for it, in milliseconds.
 const PATIENCE: f64 = 250.0;
 /// Points that a whole run leaves on the curve.
-const CURVE_POINTS: u32 = 120;
+const CURVE_POINTS: u32 = 60;
 
 /// When a driver should call [`Session::advance`] again.
 #[derive(Clone, Copy, Debug, PartialEq)]

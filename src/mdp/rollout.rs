@@ -1,6 +1,7 @@
 //! Drawing starts, actions and outcomes from a named, portable generator.
 
 use rand::Rng;
+use wide::i32x4;
 
 use super::{ACTIONS, Grid};
 
@@ -12,8 +13,40 @@ pub struct Draw<const ENDS: usize> {
     ends: [i32; ENDS],
 }
 
-/// The draw of an action.
-pub type ActionDraw = Draw<{ ACTIONS - 1 }>;
+/// The draw of an action: the same with all four ends compared at once.
+#[derive(Clone, Copy, Debug)]
+pub struct ActionDraw {
+    ends: i32x4,
+}
+
+impl ActionDraw {
+    /// Values of [`ActionDraw::passed`] lie below.
+    pub const SETS: usize = 1 << (ACTIONS - 1);
+
+    /// `probabilities`: at most five of them, with sum 1.
+    pub fn new(probabilities: &[f64]) -> Self {
+        ActionDraw { ends: i32x4::new(Draw::new(probabilities).ends) }
+    }
+
+    /// The set of actions before that which 32 uniform bits stand for, bit a for action a.
+    #[inline]
+    pub fn passed(&self, bits: u32) -> usize {
+        let above = i32x4::splat((bits >> 2) as i32 + 1);
+        above.simd_gt(self.ends).to_bitmask() as usize % Self::SETS
+    }
+
+    /// The action that comes after such a set.
+    #[inline]
+    pub fn after(passed: usize) -> usize {
+        passed.trailing_ones() as usize
+    }
+
+    /// The action that 32 uniform bits stand for.
+    #[inline]
+    pub fn outcome(&self, bits: u32) -> usize {
+        Self::after(self.passed(bits))
+    }
+}
 
 impl<const ENDS: usize> Draw<ENDS> {
     const SCALE: f64 = (1 << 30) as f64;
