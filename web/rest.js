@@ -76,6 +76,8 @@
     "wheel keydown keyup beforeinput input compositionstart compositionupdate compositionend copy cut paste focus blur " +
     "dragenter dragover dragleave drop resize hashchange popstate visibilitychange pageshow load";
   for (const kind of HAPPENINGS.split(" ")) {
-    window.addEventListener(kind, () => wake(LONG), { capture: true, passive: true });
+    // That a key is let go is nothing to be seen.
+    const isHeld = () => kind === "keyup" && performance.now() < heldUntil;
+    window.addEventListener(kind, () => isHeld() || wake(LONG), { capture: true, passive: true });
   }
 })();

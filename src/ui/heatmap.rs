@@ -124,8 +124,10 @@ impl Heatmap<'_> {
         let font_size = ui.ctx().fonts(|fonts| fonts.font_image_size());
         let mut tessellator = Tessellator::new(pixels_per_point, options, font_size, vec![]);
         let colors = &COLOR_MAPS[self.color_map];
-        // The ground, or what the colours have for it, shows between cells as a thin line, where there is room for one.
-        mesh.add_colored_rect(rect.round_to_pixels(pixels_per_point), colors.lines.map_or(palette.ground, rgb));
+        // What lies below, or what the colours have for it, shows between cells as a thin line, where there is room for one.
+        if let Some(lines) = colors.lines {
+            mesh.add_colored_rect(rect.round_to_pixels(pixels_per_point), rgb(lines));
+        }
         let gap = if cell.x >= 12.0 { 0.5 } else { 0.0 };
         for state in 0..self.grid.cells() {
             let place = self.cell_rect(rect, cell, state).shrink(gap).round_to_pixels(pixels_per_point);

@@ -13,4 +13,6 @@ mod mirror;
 pub mod page;
 #[cfg(feature = "page")]
 mod place;
+#[cfg(feature = "page")]
+mod textures;
 pub mod worker;

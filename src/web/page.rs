@@ -7,6 +7,7 @@ use web_sys::HtmlCanvasElement;
 use super::files::Files;
 use super::hands::Hands;
 use super::mirror::Mirror;
+use super::textures::Unsmoothed;
 use super::worker::{WorkerLink, worker_pool};
 use crate::ui::App;
 
@@ -57,6 +58,7 @@ async fn run() -> Result<(), String> {
             WebOptions::default(),
             Box::new(|cc| {
                 cc.egui_ctx.add_plugin(mirror);
+                cc.egui_ctx.add_plugin(Unsmoothed);
                 cc.egui_ctx.set_repaint_observer(|info| wake_page(1000.0 * info.delay.as_secs_f64()));
                 let waker = || {
                     let ctx = cc.egui_ctx.clone();
