@@ -5,8 +5,11 @@ function failPage(sentence) {
   if (message.getAttribute("role") === "alert") return;
   message.setAttribute("role", "alert");
   message.hidden = false;
-  message.innerHTML = "<h1>ape-lab cannot start</h1><p></p>";
-  message.querySelector("p").textContent = sentence;
+  const title = document.createElement("h1");
+  title.textContent = "ape-lab cannot start";
+  const text = document.createElement("p");
+  text.textContent = sentence;
+  message.replaceChildren(title, text);
 }
 window.failPage = failPage;
 window.addEventListener("DOMContentLoaded", () => {
