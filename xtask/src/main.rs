@@ -216,6 +216,16 @@ fn end_to_end_tests() -> Result<Vec<PathBuf>, Failure> {
     Ok(files)
 }
 
+/// Looks for known faults of the crates. The database of them is not among the crates: where it cannot be fetched, the
+/// tests say so and go on.
+fn advisories() -> Result<(), Failure> {
+    if tools::output("cargo", &["deny", "fetch", "db"]).is_none() {
+        println!("Advisories were not checked: their database, RustSec's on GitHub, could not be fetched.");
+        return Ok(());
+    }
+    run("cargo", &["deny", "check", "--hide-inclusion-graph", "advisories"])
+}
+
 fn test(only: &[&str]) -> Result<(), Failure> {
     const WASM: [&str; 2] = ["--target", "wasm32-unknown-unknown"];
     const DENY: [&str; 3] = ["--", "-D", "warnings"];
@@ -234,6 +244,10 @@ fn test(only: &[&str]) -> Result<(), Failure> {
         let mut command = program("cargo", &["doc", "--workspace", "--no-deps", "--document-private-items"]);
         command.env("RUSTDOCFLAGS", "-D warnings");
         run_command(command)
+    });
+    steps.step("deny", "seconds", &[Tool::CargoDeny], || {
+        run("cargo", &["deny", "check", "--hide-inclusion-graph", "licenses", "bans", "sources"])?;
+        advisories()
     });
     steps.step("native", "4 minutes at first", &[], || run("cargo", &["test", "--workspace"]));
     let wasm = [Tool::WasmTarget, Tool::WasmBindgen, Tool::WasmPack];
