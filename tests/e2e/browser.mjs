@@ -16,9 +16,10 @@ const TYPES = {
   ".webmanifest": "application/manifest+json",
 };
 
-/** The headers that the page's own file asks hosts to send with everything. */
+/** The headers that the page's own file asks hosts to send with everything; pages of old have none. */
 async function headers() {
-  const lines = (await readFile(join(DIST, "_headers"), "utf8")).split("\n").filter((line) => line.startsWith(" "));
+  const text = await readFile(join(DIST, "_headers"), "utf8").catch(() => "");
+  const lines = text.split("\n").filter((line) => line.startsWith(" "));
   return Object.fromEntries(lines.map((line) => line.trim().split(/: (.*)/, 2)));
 }
 
