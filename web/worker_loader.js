@@ -1,5 +1,10 @@
 // Starts the worker's program. What goes wrong here is told to the page as a string; the program itself
 // only ever sends bytes.
+
+// Where a host sends the page's policy with this file, too, only this script may come in.
+self.trustedTypes?.createPolicy("default", {
+  createScriptURL: (address) => (address === "./worker.js" ? address : null),
+});
 const fail = (reason) => self.postMessage("The worker could not be loaded (" + reason + ").");
 try {
   importScripts("./worker.js");

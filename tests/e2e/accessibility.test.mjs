@@ -1,6 +1,7 @@
 // The page by keyboard and by screen reader: what assistive technology finds in the mirror of the page, and what it
 // can do there. The mouse is not used.
 import assert from "node:assert/strict";
+import { readFile } from "node:fs/promises";
 import { fileURLToPath } from "node:url";
 import { after, before, test } from "node:test";
 import { launch, open, serve } from "./browser.mjs";
@@ -33,7 +34,8 @@ const focused = (page) =>
 test("axe finds nothing to object to", async () => {
   const { page, close } = await open(browser, site.address);
   await trained(page);
-  await page.addScriptTag({ path: AXE });
+  // Not as an element: the page's policy allows no such script.
+  await page.evaluate(await readFile(AXE, "utf8"));
   const check = async (place) => {
     const { violations } = await page.evaluate(() => axe.run(document, { resultTypes: ["violations"] }));
     const found = violations.map(({ id, help, nodes }) => ({ id, help, nodes: nodes.slice(0, 3).map((node) => node.html) }));

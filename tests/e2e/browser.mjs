@@ -16,14 +16,25 @@ const TYPES = {
   ".webmanifest": "application/manifest+json",
 };
 
-/** A static server for the built page, or another folder, on a free port of this machine. */
-export async function serve(folder = DIST) {
+/** The headers that the page's own file asks hosts to send with everything; pages of old have none. */
+async function headers() {
+  const text = await readFile(join(DIST, "_headers"), "utf8").catch(() => "");
+  const lines = text.split("\n").filter((line) => line.startsWith(" "));
+  return Object.fromEntries(lines.map((line) => line.trim().split(/: (.*)/, 2)));
+}
+
+/**
+ * A static server for the built page, or another folder, on a free port of this machine. With `bare` it is a host that
+ * sends no headers of the page's own.
+ */
+export async function serve(folder = DIST, { bare } = {}) {
+  const own = bare ? {} : await headers();
   const server = createServer(async (request, response) => {
     const path = normalize(decodeURIComponent(new URL(request.url, "http://localhost").pathname));
     const file = join(folder, path.endsWith("/") ? join(path, "index.html") : path);
     try {
       const bytes = await readFile(file);
-      response.writeHead(200, { "Content-Type": TYPES[extname(file)] ?? "application/octet-stream" }).end(bytes);
+      response.writeHead(200, { "Content-Type": TYPES[extname(file)] ?? "application/octet-stream", ...own }).end(bytes);
     } catch {
       response.writeHead(404).end();
     }

@@ -2,11 +2,12 @@
 //!
 //! Everything a command needs and does not find, it installs first, saying what it does and how long
 //! that takes. `tools` says what is needed and gets it, `steps` runs one command after another and sums
-//! up, `bench` measures, `offline` lists the page's files for its service worker. Little but the standard library is used, so
-//! that this program itself builds in a moment.
+//! up, `bench` measures, `offline` lists the page's files for its service worker, `server` serves them. Little but the
+//! standard library is used, so that this program itself builds in a moment.
 
 mod bench;
 mod offline;
+mod server;
 mod steps;
 mod tools;
 
@@ -22,6 +23,8 @@ const USAGE: &str = "\
 usage: cargo xtask COMMAND
 
   serve [--port N]   install what is missing, build the page, serve it on 127.0.0.1
+  serve --dist [FOLDER] [--port N]
+                     serve dist/, or another folder with a built page, as it is: nothing is built or fetched
   build              the same page made small for publishing, in dist/
   test [STEP ...]    install what tests need, run everything (or the named steps), sum up
   results            make docs/RESULTS.md and its pictures anew (2 to 3 minutes on two cores)
@@ -92,19 +95,38 @@ pub fn run_command(mut command: Command) -> Result<(), Failure> {
 const TRUNK: [&str; 2] = ["--config", "trunk.toml"];
 
 fn serve(arguments: &[&str]) -> Result<(), Failure> {
-    let wanted = match arguments {
-        [] => None,
-        ["--port", port] => {
-            Some(port.parse::<u16>().map_err(|_| format!("--port {port}: expected a number from 1 to 65535"))?)
+    let (mut wanted, mut built) = (None, None);
+    let mut rest = arguments.iter().copied().peekable();
+    while let Some(flag) = rest.next() {
+        match flag {
+            "--port" => {
+                let port = rest.next().unwrap_or_default();
+                wanted =
+                    Some(port.parse::<u16>().map_err(|_| format!("--port {port}: expected a number from 1 to 65535"))?);
+            }
+            "--dist" => built = Some(rest.next_if(|next| !next.starts_with("--")).map_or_else(dist, PathBuf::from)),
+            _ => return Err(USAGE.trim_end().to_owned()),
         }
-        _ => return Err(USAGE.trim_end().to_owned()),
-    };
+    }
+    let port = free_port(wanted)?;
+    match built {
+        Some(folder) => server::Site::open(&folder)?.serve(port),
+        None => build_and_serve(port),
+    }
+}
+
+fn free_port(wanted: Option<u16>) -> Result<u16, Failure> {
     let is_free = |port: &u16| TcpListener::bind((Ipv4Addr::LOCALHOST, *port)).is_ok();
-    let port = match wanted {
-        Some(port) if port > 0 && is_free(&port) => port,
-        Some(port) => return Err(format!("port {port} is not to be had: choose another with --port")),
-        None => (8080..8180).find(is_free).ok_or("ports 8080 to 8179 are all taken: choose one with --port")?,
-    };
+    match wanted {
+        Some(port) if port > 0 && is_free(&port) => Ok(port),
+        Some(port) => Err(format!("port {port} is not to be had: choose another with --port")),
+        None => (8080..8180)
+            .find(is_free)
+            .ok_or_else(|| "ports 8080 to 8179 are all taken: choose one with --port".to_owned()),
+    }
+}
+
+fn build_and_serve(port: u16) -> Result<(), Failure> {
     tools::install(&tools::PAGE)?;
     // trunk serves also what it could not build: so first build, then serve.
     build_page()?;
@@ -194,6 +216,16 @@ fn end_to_end_tests() -> Result<Vec<PathBuf>, Failure> {
     Ok(files)
 }
 
+/// Looks for known faults of the crates. The database of them is not among the crates: where it cannot be fetched, the
+/// tests say so and go on.
+fn advisories() -> Result<(), Failure> {
+    if tools::output("cargo", &["deny", "fetch", "db"]).is_none() {
+        println!("Advisories were not checked: their database, RustSec's on GitHub, could not be fetched.");
+        return Ok(());
+    }
+    run("cargo", &["deny", "check", "--hide-inclusion-graph", "advisories"])
+}
+
 fn test(only: &[&str]) -> Result<(), Failure> {
     const WASM: [&str; 2] = ["--target", "wasm32-unknown-unknown"];
     const DENY: [&str; 3] = ["--", "-D", "warnings"];
@@ -212,6 +244,10 @@ fn test(only: &[&str]) -> Result<(), Failure> {
         let mut command = program("cargo", &["doc", "--workspace", "--no-deps", "--document-private-items"]);
         command.env("RUSTDOCFLAGS", "-D warnings");
         run_command(command)
+    });
+    steps.step("deny", "seconds", &[Tool::CargoDeny], || {
+        run("cargo", &["deny", "check", "--hide-inclusion-graph", "licenses", "bans", "sources"])?;
+        advisories()
     });
     steps.step("native", "4 minutes at first", &[], || run("cargo", &["test", "--workspace"]));
     let wasm = [Tool::WasmTarget, Tool::WasmBindgen, Tool::WasmPack];

@@ -14,6 +14,7 @@ use crate::{Failure, program, root, run, run_command};
 
 const TRUNK: &str = "0.21.14";
 const WASM_PACK: &str = "0.15.1";
+const CARGO_DENY: &str = "0.20.2";
 
 #[derive(Clone, Copy)]
 pub enum Tool {
@@ -22,6 +23,7 @@ pub enum Tool {
     WasmBindgen,
     WasmPack,
     WasmOpt,
+    CargoDeny,
     Chromium,
     Node,
     NodePackages,
@@ -33,8 +35,16 @@ pub enum Tool {
 pub const PAGE: [Tool; 3] = [Tool::WasmTarget, Tool::Trunk, Tool::WasmBindgen];
 
 /// What the tests need.
-pub const ALL: [Tool; 7] =
-    [Tool::WasmTarget, Tool::Trunk, Tool::WasmBindgen, Tool::WasmPack, Tool::Chromium, Tool::Node, Tool::NodePackages];
+pub const ALL: [Tool; 8] = [
+    Tool::CargoDeny,
+    Tool::WasmTarget,
+    Tool::Trunk,
+    Tool::WasmBindgen,
+    Tool::WasmPack,
+    Tool::Chromium,
+    Tool::Node,
+    Tool::NodePackages,
+];
 
 pub fn install(tools: &[Tool]) -> Result<(), Failure> {
     tools.iter().try_for_each(|tool| match tool {
@@ -49,6 +59,7 @@ pub fn install(tools: &[Tool]) -> Result<(), Failure> {
             node()?;
             npm_ci("web")
         }
+        Tool::CargoDeny => cargo_program("cargo-deny", "cargo-deny", CARGO_DENY, true, "2 minutes"),
         Tool::Chromium => chromium_and_driver(),
         Tool::Node => node(),
         Tool::NodePackages => npm_ci("tests/e2e"),
