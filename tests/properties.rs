@@ -10,7 +10,7 @@ use ape_lab::attack::{AttackerChoice, Cloned, Target};
 use ape_lab::experiment::{Course, Outcome, Race, Setup, Task, address};
 use ape_lab::lab::{Command, Event, Session, TaskEvent, decode, encode};
 use ape_lab::mdp::{
-    ACTIONS, Action, CAP, Grid, GridSpec, Policy, Returns, Solver, Transition, Value, occupancy, optimal_policy,
+    ACTIONS, Action, Grid, GridSpec, Policy, Returns, Solver, Transition, Value, occupancy, optimal_policy,
     transition_model,
 };
 use nalgebra::{DMatrix, DVector};
@@ -18,6 +18,9 @@ use proptest::prelude::{Strategy, any};
 use proptest::test_runner::{Config as Runs, RngSeed, TestRunner};
 use rand::{Rng, RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
+
+/// Where the paper cuts hitting times, in steps.
+const CAP: f64 = 100.0;
 
 /// Tries a property on so many values.
 fn each<S: Strategy>(cases: u32, values: S, property: impl Fn(S::Value)) {
@@ -230,6 +233,13 @@ fn the_four_returns_go_together() {
         let share = world.grid.starts().len() as f64 / world.grid.free_cells() as f64;
         let mut solver = Solver::new(&world.grid);
         let optimal = solver.evaluate(&optimal_policy(&world.grid), world.horizon).hitting_time;
+        // Bellman: no other action is better, by the model for other people's planners.
+        for (state, actions) in &transition_model(&world.grid).transitions {
+            for ways in actions.values().filter(|_| world.grid.starts().contains(&(*state as u32))) {
+                let ahead: f64 = ways.iter().map(|way| way.0 * optimal[way.1]).sum();
+                assert!(1.0 + ahead >= optimal[*state] * (1.0 - NOISE), "{state}: {ahead} {optimal:?}");
+            }
+        }
         for policy in world.ensemble.policies() {
             let at = |solver: &mut Solver, horizon: u32| solver.evaluate(policy, horizon);
             let Value { hitting_time, returns } = at(&mut solver, world.horizon);
