@@ -116,7 +116,9 @@ fn cloning(criterion: &mut Criterion) {
 /// Table 1 over the seeds of the paper's size, with every cloner that is quick, one seed after another.
 fn table1(criterion: &mut Criterion) {
     const SEEDS: u32 = 5;
-    let attackers: Vec<_> = AttackerChoice::usual().into_iter().filter(|attacker| attacker.model().is_quick).collect();
+    let (cells, horizon) = (100, Setup::default().config.horizon);
+    let attackers: Vec<_> =
+        AttackerChoice::usual().into_iter().filter(|attacker| attacker.is_quick(cells, horizon)).collect();
     let task = |setup| Task::Table1 { setup: Box::new(setup), attackers: attackers.clone() };
     let tasks: Vec<Task> = Table1::setups(&Setup::default(), SEEDS).into_iter().map(task).collect();
     let mut group = slow(criterion, "table1");

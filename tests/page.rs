@@ -298,6 +298,20 @@ fn beta_moves_by_keyboard_and_everything_follows() {
     assert!(protected > 4.0 && figure(&page, "Clone ÷ ensemble capped") < 1.2);
 }
 
+/// Figures of another grid brought the page down.
+#[test]
+fn a_worker_that_makes_no_sense_is_given_up() {
+    let (mut page, here) = open(1280.0, 800.0);
+    let is_alive = |page: &Page| page.state().as_ref().unwrap().is_session_alive();
+    assert!(is_alive(&page));
+    let mut snapshot = page.state().as_ref().unwrap().shown().unwrap().1.clone();
+    snapshot.experts[0].hitting_time.pop();
+    here.0.borrow_mut().events.push_back(Ok(Event::Snapshot(Box::new(snapshot))));
+    page.run_steps(2);
+    page.get_by(|node| says(node).is_some_and(|text| text.contains("99 hitting times: expected 100")));
+    assert!(!is_alive(&page));
+}
+
 #[test]
 fn an_honest_observer_undoes_the_protection() {
     let (mut page, _) = open(1280.0, 800.0);

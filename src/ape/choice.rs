@@ -137,7 +137,11 @@ impl<M: Model> FromStr for Choice<M> {
                 Some(p) => format!("{}({}), {} to {}", model.name(), p.meaning, p.low, p.high),
                 None => model.name().to_owned(),
             });
-            ChoiceError { what: M::WHAT, text: text.to_owned(), known: known.collect::<Vec<_>>().join("; ") }
+            ChoiceError {
+                what: M::WHAT,
+                text: text.chars().take(40).collect(),
+                known: known.collect::<Vec<_>>().join("; "),
+            }
         })
     }
 }

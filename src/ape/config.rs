@@ -122,6 +122,8 @@ impl Config {
     /// Most experts an ensemble may have.
     pub const MAX_EXPERTS: u32 = 8;
     pub const MAX_BETA: f64 = 2.0;
+    /// Most updates of a run.
+    pub const MOST_UPDATES: u32 = 10_000_000;
 
     /// The paper's literal configuration where it differs from our default (see docs/METHOD.md).
     pub fn paper() -> Config {
@@ -145,6 +147,15 @@ impl Config {
     /// Checks every range, and that the fields go together.
     pub fn check(&self) -> Result<(), ConfigError> {
         FIELDS.iter().try_for_each(|field| field.check(self))?;
+        if self.updates() > Self::MOST_UPDATES {
+            return Err(ConfigError {
+                field: "total_steps",
+                value: self.total_steps.to_string(),
+                expected: format!("at most {} times batch_steps, which is {}", Self::MOST_UPDATES, self.batch_steps),
+            });
+        }
+        const MOST_GRU_HORIZON: u64 = 6_400;
+        const MOST_GRU_BATCH: u64 = 400_000;
         let observer = |expected: &str| {
             Err(ConfigError { field: "observer", value: self.observer.to_string(), expected: expected.to_owned() })
         };
@@ -154,6 +165,17 @@ impl Config {
         }
         if self.adversary_reward.is_some() && self.observer.model().name == "gru" {
             return observer("one whose clone is exact with an adversary_reward, of which the clone's share is told");
+        }
+        if self.observer.model().name == "gru" {
+            // What it learns in an update, and what it is tried in, is not to take longer than a second or two.
+            let units = u64::from(self.observer.parameter());
+            if units * u64::from(self.horizon) > MOST_GRU_HORIZON
+                || units * u64::from(self.batch_steps) > MOST_GRU_BATCH
+            {
+                return observer(&format!(
+                    "one with units · horizon of at most {MOST_GRU_HORIZON} and units · batch_steps of at most {MOST_GRU_BATCH}"
+                ));
+            }
         }
         if self.gradient == GradientKind::Mixture && self.observer.model().remembers {
             return observer("one without a memory with the gradient mixture, which needs a p(c|s)");

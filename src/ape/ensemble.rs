@@ -142,6 +142,16 @@ pub enum EnsembleError {
     Policy { expert: usize, error: PolicyError },
 }
 
+/// As much as a sentence can take of what is, or quotes, a part of a file.
+pub(crate) fn quoted(text: &impl ToString) -> String {
+    const MOST: usize = 300;
+    let text = text.to_string();
+    match text.char_indices().nth(MOST) {
+        Some((end, _)) => format!("{}…", &text[..end]),
+        None => text,
+    }
+}
+
 impl EnsembleFile {
     const FORMAT: &str = "ape-ensemble";
 
@@ -165,13 +175,13 @@ impl EnsembleFile {
         if text.len() > Self::LONGEST {
             return Err(EnsembleError::Long);
         }
-        let json = |error: serde_json::Error| EnsembleError::Json(error.to_string());
+        let json = |error: serde_json::Error| EnsembleError::Json(quoted(&error));
         let mut value: serde_json::Value = serde_json::from_str(text).map_err(json)?;
         let config = value.as_object_mut().and_then(|fields| fields.remove("config"));
         let file: EnsembleFile = serde_json::from_value(value).map_err(json)?;
         let config = match config {
             None | Some(serde_json::Value::Null) => return Ok(file),
-            Some(config) => serde_json::from_value(config).map_err(|error| error.to_string()),
+            Some(config) => serde_json::from_value(config).map_err(|error| quoted(&error)),
         };
         let config =
             config.and_then(|config: Config| config.check().map(|()| config).map_err(|error| error.to_string()));
@@ -184,7 +194,7 @@ impl EnsembleFile {
     /// The grid and the ensemble, when everything about them is valid.
     pub fn check(self) -> Result<(Grid, Ensemble), EnsembleError> {
         if self.format != Self::FORMAT {
-            return Err(EnsembleError::Format(self.format));
+            return Err(EnsembleError::Format(quoted(&self.format)));
         }
         if self.version != 1 {
             return Err(EnsembleError::Version(self.version));

@@ -24,6 +24,7 @@ pub use algorithm::{Algorithm, Experts, Trainer};
 pub use choice::{Choice, ChoiceError, Model, Parameter};
 pub use config::{AlgorithmKind, BaselineKind, Config, GradientKind, ReturnToGo};
 pub use demonstrate::{Demonstrator, Episode};
+pub(crate) use ensemble::quoted;
 pub use ensemble::{Contexts, Ensemble, EnsembleError, EnsembleFile};
 pub use exact_ape::{ExactApe, ExactGradient};
 pub use fields::{ConfigError, FIELDS, Field, Kind};

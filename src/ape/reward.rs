@@ -21,6 +21,8 @@ impl AdversaryReward {
     pub const FORM: &str =
         "none, or rewards as 9,9=-1 (row,column) or stay=0.5 (action) with spaces between, each from -1000 to 1000";
     const MOST: f64 = 1000.0;
+    /// Most terms: each cell of the largest grid, and each action.
+    const MOST_TERMS: usize = Grid::MOST_WALLS + ACTIONS;
 
     /// The first cell where no step of a grid begins: outside, a wall or the goal.
     pub fn idle(&self, grid: &Grid) -> Option<Cell> {
@@ -57,14 +59,27 @@ impl fmt::Display for AdversaryReward {
 
 /// Text that is no reward.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("adversary_reward {0:?}: must be {form}", form = AdversaryReward::FORM)]
-pub struct RewardError(String);
+pub enum RewardError {
+    #[error("adversary_reward {0:?}: must be {form}", form = AdversaryReward::FORM)]
+    Term(String),
+    #[error("adversary_reward of more than {most} terms: must be one for each cell and action at most", most = AdversaryReward::MOST_TERMS)]
+    Long,
+}
+
+impl RewardError {
+    fn term(text: &str) -> RewardError {
+        RewardError::Term(text.chars().take(40).collect())
+    }
+}
 
 impl FromStr for AdversaryReward {
     type Err = RewardError;
 
     fn from_str(text: &str) -> Result<Self, RewardError> {
         let mut reward = AdversaryReward::default();
+        if text.split_whitespace().nth(Self::MOST_TERMS).is_some() {
+            return Err(RewardError::Long);
+        }
         for term in text.split_whitespace() {
             let parsed = || {
                 let (place, value) = term.split_once('=')?;
@@ -75,12 +90,12 @@ impl FromStr for AdversaryReward {
                 let action = Action::ALL.iter().position(|action| action.name().eq_ignore_ascii_case(place))?;
                 Some((None, action, value))
             };
-            match parsed().ok_or_else(|| RewardError(term.to_owned()))? {
+            match parsed().ok_or_else(|| RewardError::term(term))? {
                 (Some(cell), _, value) => reward.cells.push((cell, value)),
                 (None, action, value) => reward.actions[action] += value,
             }
         }
-        if reward == AdversaryReward::default() { Err(RewardError(text.to_owned())) } else { Ok(reward) }
+        if reward == AdversaryReward::default() { Err(RewardError::term(text)) } else { Ok(reward) }
     }
 }
 
@@ -125,5 +140,6 @@ mod tests {
         for bad in ["", "9,9", "9,9=x", "jump=1", "9,9=NaN", "9,9=1e9", "-1,0=2"] {
             assert!(bad.parse::<AdversaryReward>().unwrap_err().to_string().contains("row,column"), "{bad}");
         }
+        assert_eq!("1,1=1 ".repeat(2000).parse::<AdversaryReward>(), Err(RewardError::Long));
     }
 }

@@ -23,6 +23,12 @@ pub const ATTACKER: Attacker = Attacker {
     clone,
 };
 
+/// Whether the dynamic programming over all windows takes less than half a second or so.
+pub fn is_quick(k: u32, cells: usize, horizon: u32) -> bool {
+    const MOST: u64 = 20_000_000;
+    cells as u64 * (ACTIONS as u64).pow(k) * u64::from(horizon) <= MOST
+}
+
 /// A window while the clone's moves are worked out.
 struct Window {
     /// Its cells, the present one last.

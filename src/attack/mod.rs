@@ -94,8 +94,8 @@ pub struct Attacker {
     pub parameter: Option<Parameter>,
     /// The numbers with which it takes part in a comparison of all; empty without a parameter.
     pub usual: &'static [u32],
-    /// Whether it is fast enough to be made anew while training goes on.
-    pub is_quick: bool,
+    /// Whether it is fast enough to be made anew while training goes on; [`AttackerChoice::is_quick`] knows its number too.
+    is_quick: bool,
     pub remembers: bool,
     /// Makes the clone; nothing when it was told to stop.
     clone: fn(&Target, u32, &mut Progress) -> Option<Cloned>,
@@ -149,6 +149,13 @@ impl AttackerChoice {
             if usual.is_empty() { vec![choice] } else { usual.iter().map(|&n| choice.with_parameter(n)).collect() }
         };
         AttackerChoice::all().flat_map(with).collect()
+    }
+
+    /// Whether it is fast enough to be made anew while training goes on, on so many cells within so many steps.
+    pub fn is_quick(&self, cells: usize, horizon: u32) -> bool {
+        let model = self.model();
+        model.is_quick
+            && (model.name != history_k::ATTACKER.name || history_k::is_quick(self.parameter(), cells, horizon))
     }
 
     /// Makes the clone; nothing when `progress` said to stop.

@@ -11,8 +11,9 @@ use crate::mdp::{Cell, Grid, GridSpec};
 
 /// Version of the names and of what they mean.
 const VERSION: &str = "1";
-/// Longest address that is read.
+/// Longest address that is read, in bytes, and most names in it.
 const LONGEST: usize = 50_000;
+const MOST_NAMES: usize = 100;
 /// What browsers would change in an address, and what separates its parts.
 const ESCAPED: &AsciiSet =
     &CONTROLS.add(b' ').add(b'"').add(b'<').add(b'>').add(b'`').add(b'#').add(b'%').add(b'&').add(b'+');
@@ -31,8 +32,12 @@ fn refuse<T>(sentence: String) -> Result<T, AddressError> {
 
 /// A pair that is no good.
 pub fn bad<T>(name: &str, value: &str, expected: &str) -> Result<T, AddressError> {
-    let shown: String = value.chars().take(40).collect();
-    refuse(format!("{name}={shown}: expected {expected}"))
+    refuse(format!("{}={}: expected {expected}", shown(name), shown(value)))
+}
+
+/// As much of a name or a value as a sentence can take.
+fn shown(text: &str) -> String {
+    text.chars().take(40).collect()
 }
 
 /// Pairs as the text that follows `#`.
@@ -44,7 +49,7 @@ pub fn encode(pairs: &Pairs) -> String {
 /// The pairs of such a text.
 pub fn decode(text: &str) -> Result<Pairs, AddressError> {
     if text.len() > LONGEST {
-        return refuse(format!("it is {} characters long, expected at most {LONGEST}", text.len()));
+        return refuse(format!("it is {} bytes long, expected at most {LONGEST}", text.len()));
     }
     let mut pairs = Pairs::new();
     for part in text.split('&').filter(|part| !part.is_empty()) {
@@ -55,7 +60,10 @@ pub fn decode(text: &str) -> Result<Pairs, AddressError> {
             return bad(name, value, "text in UTF-8");
         };
         if pairs.iter().any(|(other, _)| other == name) {
-            return refuse(format!("{name} stands there twice"));
+            return refuse(format!("{} stands there twice", shown(name)));
+        }
+        if pairs.len() == MOST_NAMES {
+            return refuse(format!("it has more than {MOST_NAMES} names"));
         }
         pairs.push((name.to_owned(), value.into_owned()));
     }
@@ -201,7 +209,7 @@ fn read_walls(text: &str) -> Option<Vec<Cell>> {
             let (first, last) = run.split_once('-').unwrap_or((run, run));
             let (first, last): (u32, u32) = (first.parse().ok()?, last.parse().ok()?);
             // No grid is wider: a range is never long.
-            if first > last || last >= Grid::MAX_SIDE || walls.len() > (Grid::MAX_SIDE * Grid::MAX_SIDE) as usize {
+            if first > last || last >= Grid::MAX_SIDE || walls.len() > Grid::MOST_WALLS {
                 return None;
             }
             walls.extend((first..=last).map(|col| (row, col)));
@@ -277,6 +285,9 @@ mod tests {
             let found = sentence(text);
             assert!(found.contains(expected), "{text}: {found}");
         }
-        assert!(sentence(&"x".repeat(LONGEST + 1)).contains("50001 characters"));
+        assert!(sentence(&"x".repeat(LONGEST + 1)).contains("50001 bytes"));
+        let names: Vec<String> = (0..200).map(|i| format!("n{i}=1")).collect();
+        assert!(sentence(&names.join("&")).contains("more than 100 names"));
+        assert!(sentence(&format!("v=1&{}=1", "n".repeat(9000))).len() < 200);
     }
 }

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::ape::{Config, ConfigError, EnsembleError, EnsembleFile};
+use crate::ape::{Config, ConfigError, EnsembleError, EnsembleFile, quoted};
 use crate::mdp::{Grid, GridError, GridSpec, HORIZON};
 
 /// What changed on the way of a run: together with grid and configuration it gives the same run again.
@@ -15,6 +15,9 @@ pub struct Course {
 }
 
 impl Course {
+    /// Most turns of a run: nobody moves a slider as often.
+    pub const MOST_TURNS: usize = 10_000;
+
     /// From the moment after `update` updates on β is `beta`; what was to come later is forgotten.
     pub fn turn(&mut self, update: u32, beta: f64) {
         self.turns.retain(|(earlier, _)| *earlier < update);
@@ -45,9 +48,13 @@ pub enum SetupError {
     #[error("grid: {0}")]
     Grid(#[from] GridError),
     #[error(
-        "course: expected turns of β in the order of their updates and before the last, and 1 to 10,000,000 updates in all"
+        "course: expected at most {} turns of β in the order of their updates and before the last, and 1 to {} updates in all",
+        Course::MOST_TURNS,
+        Config::MOST_UPDATES
     )]
     Course,
+    #[error("grid: must be that of the ensemble which is given")]
+    TwoGrids,
     #[error("ensemble: {0}")]
     Ensemble(#[from] EnsembleError),
     #[error("config: {0}")]
@@ -63,6 +70,7 @@ impl Setup {
     /// Checks everything.
     pub fn check(&self) -> Result<(), SetupError> {
         let grid = match &self.ensemble {
+            Some(given) if given.grid != self.grid => return Err(SetupError::TwoGrids),
             Some(given) => given.clone().check()?.0,
             None => Grid::new(self.grid.clone())?,
         };
@@ -72,12 +80,13 @@ impl Setup {
     }
 
     /// Checks what is to change on the way.
-    pub fn check_course(&self) -> Result<(), SetupError> {
-        const MOST_UPDATES: u32 = 10_000_000;
+    fn check_course(&self) -> Result<(), SetupError> {
         let Course { turns, updates } = &self.course;
         let is_ascending = turns.is_sorted_by(|(a, _), (b, _)| a < b);
         let is_within = turns.last().is_none_or(|(last, _)| *last < self.updates());
-        if !is_ascending || !is_within || updates.is_some_and(|updates| !(1..=MOST_UPDATES).contains(&updates)) {
+        let is_short = turns.len() <= Course::MOST_TURNS;
+        let is_run = updates.is_none_or(|updates| (1..=Config::MOST_UPDATES).contains(&updates));
+        if !is_short || !is_ascending || !is_within || !is_run {
             return Err(SetupError::Course);
         }
         turns.iter().try_for_each(|&(_, beta)| Ok(Config { beta, ..self.config.clone() }.check()?))
@@ -97,7 +106,7 @@ impl Setup {
     /// Reads a configuration file: the fields of [`Config`], with a `grid` where it is not the paper's. An
     /// ensemble file does too: its `grid` and `config` are taken.
     pub fn parse(text: &str) -> Result<Setup, SetupError> {
-        let json = |error: serde_json::Error| SetupError::Json(error.to_string());
+        let json = |error: serde_json::Error| SetupError::Json(quoted(&error));
         let value: serde_json::Value = serde_json::from_str(text).map_err(json)?;
         let serde_json::Value::Object(mut fields) = value else {
             return Err(SetupError::Json("expected an object of fields, as {\"beta\": 0.3, \"seed\": 2}".to_owned()));

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use super::{Setup, SetupError, Sweep, SweepRun, sweep};
-use crate::ape::{Config, Trainer};
+use crate::ape::{Config, Trainer, quoted};
 use crate::mdp::{Grid, GridSpec, KnownReturns, RETURN_KINDS};
 
 /// Shard I of K, written `I/K`. Run r of a sweep, counted from 0, is in shard r mod K + 1, so that every shard has
@@ -377,10 +377,10 @@ impl Shard {
             format: String,
             version: u32,
         }
-        let json = |error: serde_json::Error| ShardError::Json(error.to_string());
+        let json = |error: serde_json::Error| ShardError::Json(quoted(&error));
         let Head { format, version } = serde_json::from_str(text).map_err(json)?;
         if format != Self::FORMAT {
-            return Err(ShardError::Format(format));
+            return Err(ShardError::Format(quoted(&format)));
         }
         if version != 1 {
             return Err(ShardError::Version(version));

@@ -8,7 +8,7 @@ use super::race::{Race, Raced};
 use super::sweep::{self, SweepRun};
 use super::table1::{self, MethodRun};
 use super::{Clock, Setup};
-use crate::ape::EnsembleFile;
+use crate::ape::{Config, EnsembleFile};
 use crate::attack::{AttackerChoice, Cloned, Progress, Target};
 
 /// What one worker does in one go.
@@ -34,17 +34,26 @@ pub enum Outcome {
 }
 
 impl Task {
+    /// Most cloners of one table.
+    const MOST_ATTACKERS: usize = 100;
+
     /// Does it. Nothing when told to stop, an error when its input is no good.
     pub fn run(&self, clock: Clock, progress: &mut Progress) -> Result<Option<Outcome>, String> {
         Ok(match self {
             Task::Attack { ensemble, attacker, horizon, seed } => {
+                let config = Config { horizon: *horizon, ..Config::default() };
+                config.check().map_err(|error| error.to_string())?;
                 let (grid, ensemble) = (**ensemble).clone().check().map_err(|error| error.to_string())?;
                 let target = Target { grid: &grid, ensemble: &ensemble, horizon: *horizon, seed: *seed };
                 Attack::run(&target, *attacker, clock, progress)
                     .map(|(attack, cloned)| Outcome::Attack(attack, Box::new(cloned)))
             }
             Task::Table1 { setup, attackers } => {
+                setup.check().map_err(|error| error.to_string())?;
                 table1::check(&setup.config)?;
+                if attackers.len() > Self::MOST_ATTACKERS {
+                    return Err(format!("{} attackers: must be at most {}", attackers.len(), Self::MOST_ATTACKERS));
+                }
                 table1::run_seed(setup, attackers, progress)?.map(Outcome::Table1)
             }
             Task::Sweep { setup } => {

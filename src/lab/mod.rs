@@ -6,6 +6,7 @@
 //! In the browser a Web Worker drives it (`src/bin/worker.rs`), in a window a thread ([`ThreadLink`]). The
 //! page holds the other end as a [`Link`].
 
+mod check;
 mod link;
 mod pool;
 mod protocol;

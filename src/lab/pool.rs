@@ -24,7 +24,8 @@ pub type TaskId = u32;
 pub struct Pool {
     hire: Box<dyn Fn() -> Box<dyn Hand>>,
     most: usize,
-    hands: Vec<(Box<dyn Hand>, Option<TaskId>)>,
+    /// Each with the task at hand.
+    hands: Vec<(Box<dyn Hand>, Option<(TaskId, Task)>)>,
     queue: VecDeque<(TaskId, Task)>,
     begun: TaskId,
 }
@@ -61,7 +62,7 @@ impl Pool {
     pub fn cancel(&mut self, id: TaskId) {
         self.queue.retain(|(queued, _)| *queued != id);
         for (hand, busy) in &mut self.hands {
-            if *busy == Some(id) {
+            if busy.as_ref().is_some_and(|(at_hand, _)| *at_hand == id) {
                 hand.stop();
                 *busy = None;
             }
@@ -79,10 +80,19 @@ impl Pool {
                     TaskEvent::Failed(sentence)
                 });
                 // What comes from a task that was cancelled is of no interest.
-                let Some(id) = *busy else { continue };
-                if !matches!(event, TaskEvent::Progress(_)) {
-                    *busy = None;
-                }
+                let Some((id, task)) = busy.take() else { continue };
+                let event = match event {
+                    TaskEvent::Done(outcome, ms) => match outcome.check(&task) {
+                        Ok(()) if ms.is_finite() => TaskEvent::Done(outcome, ms),
+                        Ok(()) => TaskEvent::Failed(format!("{ms} milliseconds of work: expected a number")),
+                        Err(sentence) => TaskEvent::Failed(sentence),
+                    },
+                    TaskEvent::Progress(part) => {
+                        *busy = Some((id, task));
+                        TaskEvent::Progress(if part.is_finite() { part.clamp(0.0, 1.0) } else { 0.0 })
+                    }
+                    event => event,
+                };
                 news.push((id, event));
             }
         }
@@ -104,7 +114,7 @@ impl Pool {
             if let Some((id, task)) = self.queue.pop_front() {
                 let (hand, busy) = &mut self.hands[free];
                 hand.begin(&task);
-                *busy = Some(id);
+                *busy = Some((id, task));
             }
         }
     }

@@ -13,6 +13,9 @@ use crate::mdp::{KnownReturns, Policy, Returns};
 /// first variant, so that every version can read every other's.
 pub const PROTOCOL: u32 = 4;
 
+/// Longest message, in bytes: the largest ensemble there can be, with its clones and its curve, takes a tenth of it.
+pub const LONGEST: usize = 16_000_000;
+
 /// From the page to the session.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Command {
@@ -42,9 +45,9 @@ pub enum Command {
     Step,
     /// Back to the start of the run, paused.
     Reset,
-    /// Updates per second; `None` is as fast as it goes.
+    /// Updates per second, from 0.01 to 1,000,000; `None` is as fast as it goes.
     Speed(Option<f32>),
-    /// Clones to evaluate besides that of the run's own observer; those that are not quick are left out.
+    /// Clones to evaluate besides that of the run's own observer, sixteen at most; those that are not quick are left out.
     Show(Vec<AttackerChoice>),
     /// Send the ensemble as it is, in full precision.
     Export,
@@ -186,5 +189,13 @@ pub fn encode(message: &impl Serialize) -> Vec<u8> {
 
 /// A message from bytes; a sentence when they are none.
 pub fn decode<'a, T: Deserialize<'a>>(bytes: &'a [u8]) -> Result<T, String> {
-    postcard::from_bytes(bytes).map_err(|error| format!("A message could not be read ({error})."))
+    let wrong = |why: String| format!("A message could not be read ({why}).");
+    if bytes.len() > LONGEST {
+        return Err(wrong(format!("{} bytes: expected at most {LONGEST}", bytes.len())));
+    }
+    match postcard::take_from_bytes(bytes) {
+        Ok((message, [])) => Ok(message),
+        Ok((_, rest)) => Err(wrong(format!("{} bytes are left over", rest.len()))),
+        Err(error) => Err(wrong(error.to_string())),
+    }
 }

@@ -3,6 +3,8 @@
 //! It is driven from outside: [`Session::handle`] takes a command, [`Session::advance`] works for a few
 //! milliseconds and says when to call it again, [`Session::events`] hands out what is to be sent.
 
+use std::ops::RangeInclusive;
+
 use super::recording::{Recording, advance};
 use super::{CloneView, Command, Event, Exported, PolicyView, RunState, Snapshot, Started};
 use crate::ape::{Config, Ensemble, EnsembleFile, Trainer};
@@ -20,6 +22,11 @@ const IN_FLIGHT: usize = 2;
 const PATIENCE: f64 = 250.0;
 /// Points that a whole run leaves on the curve.
 const CURVE_POINTS: u32 = 60;
+
+/// Clones that may be shown besides that of the run's own observer.
+const MOST_SHOWN: usize = 16;
+/// Updates per second that can be asked for.
+const SPEEDS: RangeInclusive<f32> = 0.01..=1e6;
 
 /// When a driver should call [`Session::advance`] again.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -156,9 +163,16 @@ impl Session {
                 self.begin(setup, false, false)?;
             }
             Command::Speed(speed) => {
+                if let Some(speed) = speed.filter(|speed| !SPEEDS.contains(speed)) {
+                    let (least, most) = (SPEEDS.start(), SPEEDS.end());
+                    return Err(format!("Speed {speed}: must be from {least} to {most} updates a second."));
+                }
                 self.speed = speed;
                 self.allowance = 0.0;
                 return Ok(());
+            }
+            Command::Show(cloners) if cloners.len() > MOST_SHOWN => {
+                return Err(format!("{} clones: must be at most {MOST_SHOWN}.", cloners.len()));
             }
             Command::Show(cloners) => self.show = cloners,
             Command::Export => {
@@ -220,6 +234,12 @@ impl Session {
             run.go_on();
             return Ok(());
         }
+        if run.setup.course.turns.len() == Course::MOST_TURNS {
+            return Err(format!(
+                "β was moved {} times in this run, which is as often as it can be.",
+                Course::MOST_TURNS
+            ));
+        }
         run.trainer_mut().set_beta(beta).map_err(|error| error.to_string())?;
         run.setup.course.turn(update, beta);
         let has_future = run.recording.as_ref().is_some_and(|recording| recording.end() > update);
@@ -228,7 +248,8 @@ impl Session {
                 recording.cut(update);
             }
             // At least half of a run is still to come.
-            run.last_update = run.last_update.max(update.saturating_add(run.setup.config.updates() / 2));
+            let half = update.saturating_add(run.setup.config.updates() / 2);
+            run.last_update = run.last_update.max(half).min(Config::MOST_UPDATES);
             run.set_course_updates();
             run.curve.clear();
             let (optimal, setup) = (run.optimal.clone(), run.setup.clone());
@@ -245,6 +266,7 @@ impl Session {
         let subject = match setup.ensemble.clone().map(EnsembleFile::check) {
             Some(given) => {
                 let (grid, ensemble) = given.map_err(|error| error.to_string())?;
+                setup.config.check().map_err(|error| error.to_string())?;
                 Subject::Given { grid, ensemble }
             }
             None => {
@@ -253,7 +275,7 @@ impl Session {
                 Subject::Training(Box::new(trainer))
             }
         };
-        setup.check_course().map_err(|error| error.to_string())?;
+        setup.check().map_err(|error| error.to_string())?;
         self.runs += 1;
         let grid = subject.grid();
         let optimal = optimal_policy(grid);
@@ -384,7 +406,8 @@ impl Run {
     /// Plays; a run that had ended for as long again.
     fn go_on(&mut self) {
         if self.trainer().updates() >= self.last_update {
-            self.last_update = self.trainer().updates().saturating_add(self.setup.config.updates());
+            let last = self.trainer().updates().saturating_add(self.setup.config.updates());
+            self.last_update = last.min(Config::MOST_UPDATES);
         }
         self.set_course_updates();
         (self.is_playing, self.is_silent) = (true, false);
@@ -461,7 +484,8 @@ impl Run {
         let own = AttackerChoice::of(observer);
         let mut clones: Vec<CloneView> = Vec::new();
         for cloner in std::iter::once(own).chain(show.iter().copied()) {
-            let is_wanted = cloner == own || cloner.model().is_quick;
+            let is_at_hand = cloner == own && matches!(self.subject, Subject::Training(_));
+            let is_wanted = is_at_hand || cloner.is_quick(grid.cells(), horizon);
             if clones.iter().any(|clone| clone.cloner == cloner) || !is_wanted {
                 continue;
             }

@@ -60,6 +60,8 @@ pub enum GridError {
         Grid::MAX_SIDE
     )]
     Size { rows: u32, cols: u32 },
+    #[error("{0} walls: must be at most {most}, one for each cell of the largest grid", most = Grid::MOST_WALLS)]
+    Walls(usize),
     #[error("slip {0}: must be at least 0 and below 1")]
     Slip(f64),
     #[error("goal (row {}, column {}) lies outside the grid of {rows} × {cols} cells", .goal.0, .goal.1)]
@@ -89,6 +91,8 @@ pub struct Grid {
 impl Grid {
     pub const MIN_SIDE: u32 = 2;
     pub const MAX_SIDE: u32 = 32;
+    /// Most walls in a list, those that stand there twice included.
+    pub const MOST_WALLS: usize = (Self::MAX_SIDE * Self::MAX_SIDE) as usize;
 
     /// Checks a grid: sizes, places, slip, and that every free cell can reach the goal.
     pub fn new(spec: GridSpec) -> Result<Grid, GridError> {
@@ -96,6 +100,9 @@ impl Grid {
         let sides = Self::MIN_SIDE..=Self::MAX_SIDE;
         if !sides.contains(&rows) || !sides.contains(&cols) {
             return Err(GridError::Size { rows, cols });
+        }
+        if spec.walls.len() > Self::MOST_WALLS {
+            return Err(GridError::Walls(spec.walls.len()));
         }
         if !(0.0..1.0).contains(&spec.slip) {
             return Err(GridError::Slip(spec.slip));
@@ -237,6 +244,7 @@ mod tests {
         assert!(matches!(refused(GridSpec { goal: (10, 0), ..paper() }), GridError::GoalOutside { .. }));
         assert!(matches!(refused(GridSpec { walls: vec![(0, 10)], ..paper() }), GridError::WallOutside { .. }));
         assert_eq!(refused(GridSpec { walls: vec![(0, 0)], ..paper() }), GridError::GoalIsWall((0, 0)));
+        assert_eq!(refused(GridSpec { walls: vec![(1, 1); 1025], ..paper() }), GridError::Walls(1025));
         let corner = vec![(8, 9), (9, 8)];
         assert_eq!(refused(GridSpec { walls: corner, ..paper() }), GridError::Unreachable((9, 9)));
         let walled_in = vec![(0, 1), (1, 0), (1, 1)];

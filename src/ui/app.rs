@@ -462,18 +462,23 @@ impl App {
                     let sentence = "The worker is of another version than the page: reload the page.";
                     self.session = Session::Failed(sentence.to_owned());
                 }
-                Ok(Event::Started(started)) => self.begun = Some(*started),
-                Ok(Event::Snapshot(snapshot)) => self.take(*snapshot),
-                Ok(Event::Exported(exported)) => self.take_ensemble(*exported),
+                Ok(Event::Started(started)) => match started.check() {
+                    Ok(_) => self.begun = Some(*started),
+                    Err(sentence) => self.distrust(&sentence),
+                },
+                Ok(Event::Snapshot(snapshot)) => match self.check(&snapshot) {
+                    Ok(()) => self.take(*snapshot),
+                    Err(sentence) => self.distrust(&sentence),
+                },
+                Ok(Event::Exported(exported)) => match exported.check() {
+                    Ok(()) => self.take_ensemble(*exported),
+                    Err(sentence) => self.distrust(&sentence),
+                },
                 Ok(Event::Refused(sentence)) => {
                     self.wanted.clear();
                     self.notice = Some(sentence);
                 }
-                Err(sentence) => {
-                    self.session = Session::Failed(sentence);
-                    self.begun = None;
-                    self.wanted.clear();
-                }
+                Err(sentence) => self.lose(sentence),
             }
         }
         for (id, event) in self.pool.receive() {
@@ -490,6 +495,29 @@ impl App {
         }
         while let Some(sentence) = self.host.failure() {
             self.notice = Some(sentence);
+        }
+    }
+
+    /// The session is gone.
+    fn lose(&mut self, sentence: String) {
+        self.session = Session::Failed(sentence);
+        self.begun = None;
+        self.wanted.clear();
+    }
+
+    /// What the worker says makes no sense.
+    fn distrust(&mut self, why: &str) {
+        self.lose(format!("The worker has sent what cannot be shown ({why})."));
+    }
+
+    /// Whether a snapshot is one of its run; of a run that is not on the page it does not matter.
+    fn check(&self, snapshot: &Snapshot) -> Result<(), String> {
+        let begun = self.begun.as_ref().filter(|begun| begun.run == snapshot.run);
+        let shown = self.shown.as_ref().filter(|shown| shown.started.run == snapshot.run);
+        match (begun, shown) {
+            (Some(begun), _) => snapshot.check(&begun.check()?),
+            (None, Some(shown)) => snapshot.check(&shown.grid),
+            (None, None) => Ok(()),
         }
     }
 

@@ -57,6 +57,7 @@ pub fn list<'a>(started: &'a Started, snapshot: &'a Snapshot, view: &View) -> Ve
         clone: None,
         waiting: String::new(),
     });
+    let cells = started.optimal.policy.len();
     let clones = view.clones.iter().enumerate().map(|(index, cloner)| {
         let clone = snapshot.clones.iter().find(|clone| clone.cloner == *cloner);
         let contexts = clone.map_or(&[][..], |clone| &clone.contexts);
@@ -66,7 +67,7 @@ pub fn list<'a>(started: &'a Started, snapshot: &'a Snapshot, view: &View) -> Ve
             short: cloner.to_string(),
             policy: clone.map(|clone| &clone.view),
             clone: Some((index, contexts)),
-            waiting: waiting(*cloner, snapshot.state),
+            waiting: waiting(cloner.is_quick(cells, started.setup.config.horizon), snapshot.state),
         }
     });
     let optimal = Panel {
@@ -80,9 +81,9 @@ pub fn list<'a>(started: &'a Started, snapshot: &'a Snapshot, view: &View) -> Ve
 }
 
 /// Why a clone is not there yet.
-fn waiting(cloner: AttackerChoice, state: RunState) -> String {
+fn waiting(is_quick: bool, state: RunState) -> String {
     match state {
-        _ if cloner.model().is_quick => "evaluating …".to_owned(),
+        _ if is_quick => "evaluating …".to_owned(),
         RunState::Playing => "made when training rests".to_owned(),
         _ => "being made …".to_owned(),
     }

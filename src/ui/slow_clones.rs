@@ -5,6 +5,7 @@ use crate::ape::{Config, EnsembleFile};
 use crate::attack::AttackerChoice;
 use crate::experiment::{Outcome, Task};
 use crate::lab::{CloneView, Exported, Pool, RunState, TaskEvent, TaskId};
+use crate::mdp::GridSpec;
 
 /// A run and one of its updates.
 type Moment = (u32, u32);
@@ -44,7 +45,11 @@ impl App {
 
     fn wanted_slow_clones(&self) -> Vec<AttackerChoice> {
         let own = AttackerChoice::of(self.setup.config.observer);
-        let is_slow = |cloner: &AttackerChoice| *cloner != own && !cloner.model().is_quick;
+        let GridSpec { rows, cols, .. } = self.setup.grid;
+        let (cells, horizon) = ((rows * cols) as usize, self.setup.config.horizon);
+        // Only a run that trains has its own at hand.
+        let is_at_hand = |cloner: &AttackerChoice| *cloner == own && self.setup.ensemble.is_none();
+        let is_slow = |cloner: &AttackerChoice| !is_at_hand(cloner) && !cloner.is_quick(cells, horizon);
         self.view.clones.iter().copied().filter(is_slow).collect()
     }
 

@@ -1,11 +1,12 @@
-//! The commands of this repository: `cargo xtask serve`, `build`, `test`, `results`, `bench`, `tools`, `offline`.
+//! The commands of this repository: `cargo xtask serve`, `build`, `test`, `results`, `bench`, `fuzz`, `tools`, `offline`.
 //!
 //! Everything a command needs and does not find, it installs first, saying what it does and how long
 //! that takes. `tools` says what is needed and gets it, `steps` runs one command after another and sums
-//! up, `bench` measures, `offline` lists the page's files for its service worker, `server` serves them. Little but the
-//! standard library is used, so that this program itself builds in a moment.
+//! up, `bench` measures, `fuzz` makes input up, `offline` lists the page's files for its service worker, `server` serves
+//! them. Little but the standard library is used, so that this program itself builds in a moment.
 
 mod bench;
+mod fuzz;
 mod offline;
 mod server;
 mod steps;
@@ -19,18 +20,20 @@ use std::time::Duration;
 use steps::Steps;
 use tools::Tool;
 
-const USAGE: &str = "\
+pub const USAGE: &str = "\
 usage: cargo xtask COMMAND
 
   serve [--port N]   install what is missing, build the page, serve it on 127.0.0.1
   serve --dist [FOLDER] [--port N]
                      serve dist/, or another folder with a built page, as it is: nothing is built or fetched
   build              the same page made small for publishing, in dist/
-  test [STEP ...]    install what tests need, run everything (or the named steps), sum up
+  test [STEP ...]    install what tests need, run everything (or the named steps), sum up;
+                     with --long the step fuzz too
   results            make docs/RESULTS.md and its pictures anew (2 to 3 minutes on two cores)
   bench [PART ...]   measure native, counts and browser, or the named parts; write docs/PERFORMANCE.md.
                      Parts: native (3 minutes), counts (1), browser, peers (JAX and PyTorch beside it),
                      and document, which measures nothing
+  fuzz [SECONDS]     hand made-up input to everything that reads some, 60 s each (docs/TESTING.md)
   tools              only install what the other commands need
   offline [FOLDER]   write the service worker of a built page (trunk runs this after each build)
 ";
@@ -47,6 +50,7 @@ fn main() -> ExitCode {
         Some("test") => test(&rest),
         Some("results") => results(),
         Some("bench") => bench::bench(&rest),
+        Some("fuzz") => fuzz::fuzz(&rest),
         Some("tools") => tools::install(&tools::ALL),
         Some("offline") => offline(&rest),
         Some("help" | "--help" | "-h") => {
@@ -226,10 +230,12 @@ fn advisories() -> Result<(), Failure> {
     run("cargo", &["deny", "check", "--hide-inclusion-graph", "advisories"])
 }
 
-fn test(only: &[&str]) -> Result<(), Failure> {
+fn test(arguments: &[&str]) -> Result<(), Failure> {
     const WASM: [&str; 2] = ["--target", "wasm32-unknown-unknown"];
     const DENY: [&str; 3] = ["--", "-D", "warnings"];
-    let mut steps = Steps::new(only);
+    let is_long = arguments.contains(&"--long");
+    let only: Vec<&str> = arguments.iter().copied().filter(|argument| *argument != "--long").collect();
+    let mut steps = Steps::new(&only);
     steps.step("fmt", "seconds", &[], || run("cargo", &["fmt", "--all", "--check"]));
     steps.step("clippy", "2 minutes at first", &[], || {
         run("cargo", &[&["clippy", "--workspace", "--all-targets"][..], &DENY].concat())
@@ -273,5 +279,9 @@ fn test(only: &[&str]) -> Result<(), Failure> {
         command.env("CHROMIUM", tools::chromium()?);
         run_command(command)
     });
+    // It takes long, and finds another thing every time: not for every change.
+    if is_long || only.contains(&"fuzz") {
+        steps.step("fuzz", "12 minutes at first", &[], || fuzz::fuzz(&[]));
+    }
     steps.sum_up()
 }

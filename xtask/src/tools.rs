@@ -15,6 +15,7 @@ use crate::{Failure, program, root, run, run_command};
 const TRUNK: &str = "0.21.14";
 const WASM_PACK: &str = "0.15.1";
 const CARGO_DENY: &str = "0.20.2";
+const CARGO_FUZZ: &str = "0.13.2";
 
 #[derive(Clone, Copy)]
 pub enum Tool {
@@ -22,6 +23,7 @@ pub enum Tool {
     Trunk,
     WasmBindgen,
     WasmPack,
+    CargoFuzz,
     WasmOpt,
     CargoDeny,
     Chromium,
@@ -55,6 +57,7 @@ pub fn install(tools: &[Tool]) -> Result<(), Failure> {
             cargo_program("wasm-bindgen-cli", "wasm-bindgen", &locked_wasm_bindgen()?, false, "2 minutes")
         }
         Tool::WasmPack => cargo_program("wasm-pack", "wasm-pack", WASM_PACK, true, "1 minute"),
+        Tool::CargoFuzz => cargo_program("cargo-fuzz", "cargo-fuzz", CARGO_FUZZ, true, "1 minute"),
         Tool::WasmOpt => {
             node()?;
             npm_ci("web")
