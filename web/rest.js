@@ -15,8 +15,9 @@
   let timer;
   let alarm = Infinity;
 
-  /** Where somebody asks for it, every frame is measured (User Timing). */
+  /** Where somebody asks for it, every frame is measured (User Timing). What cannot be painted is not (faults.js). */
   const measured = (callback) => (time) => {
+    if (!window.pageCanPaint()) return;
     const start = performance.now();
     callback(time);
     if (window.apeLabMeasures) performance.measure("ape-lab: frame", { start, end: performance.now() });
