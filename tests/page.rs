@@ -223,7 +223,15 @@ fn it_trains_by_itself_and_shows_the_effect() {
 /// From a phone to a 4K screen every widget lies within the page's width, and on a phone a finger can press it.
 #[test]
 fn nothing_is_cut_off() {
-    let sizes = [(390.0, 844.0), (730.0, 1000.0), (800.0, 500.0), (1000.0, 700.0), (1280.0, 800.0), (3840.0, 2160.0)];
+    let sizes = [
+        (320.0, 480.0),
+        (390.0, 844.0),
+        (730.0, 1000.0),
+        (800.0, 500.0),
+        (1000.0, 700.0),
+        (1280.0, 800.0),
+        (3840.0, 2160.0),
+    ];
     let small = RefCell::new(std::collections::BTreeSet::new());
     for (width, height) in sizes {
         let (mut page, _) = open(width, height);
@@ -375,19 +383,48 @@ fn play_pause_step_and_reset_have_buttons() {
 
 /// A worker that dies leaves the page as it was, with a sentence and a button that brings a new one.
 #[test]
-fn a_dead_worker_can_be_replaced() {
+fn a_dead_worker_is_replaced_and_the_run_goes_on() {
     let (mut page, here) = open(1280.0, 800.0);
-    let before = figure(&page, "Ensemble capped");
-    here.0.borrow_mut().events.push_back(Err("The worker has stopped (out of memory).".to_owned()));
+    page.state_mut().as_mut().unwrap().seek(100);
+    until(&mut page, "paused at update 100 of 732, digest");
+    let before = (figure(&page, "Ensemble capped"), text(&page, "paused"));
+    let die = |page: &mut Page| {
+        here.0.borrow_mut().events.push_back(Err("The worker has stopped (out of memory).".to_owned()));
+        page.run_steps(6);
+    };
+    die(&mut page);
+    let sentence = "The worker has stopped (out of memory): it was started again and goes on from update 100.";
+    page.get_by(|node| node.role() == Role::Alert && says(node).is_some_and(|text| text == sentence));
+    until(&mut page, "paused at update 100 of 732, digest");
+    assert_eq!((figure(&page, "Ensemble capped"), text(&page, "paused")), before);
+    assert_eq!(here.0.borrow().starts, 2);
+    let resumed = |desk: &Desk| desk.commands.iter().filter(|c| matches!(c, Command::Resume { .. })).count();
+    assert_eq!(resumed(&here.0.borrow()), 1);
+
+    // One that dies again and again is left dead, until somebody asks for another.
+    (0..3).for_each(|_| die(&mut page));
+    assert_eq!(here.0.borrow().starts, 4);
+    page.get_by(|node| says(node).is_some_and(|text| text == "stopped at update 100 of 732"));
+    assert_eq!(figure(&page, "Ensemble capped"), before.0);
+    page.get_by_role_and_label(Role::Button, "Copy the report").click_accesskit();
+    page.step();
+    let copied = page.output().platform_output.commands.iter().any(|command| {
+        matches!(command, egui::OutputCommand::CopyText(text) if text.starts_with("ape-lab ") && text.contains("out of memory"))
+    });
+    assert!(copied);
+    page.get_by_role_and_label(Role::Button, "Restart the worker").click_accesskit();
     page.run_steps(3);
-    page.get_by(|node| node.role() == Role::Alert && says(node).is_some_and(|text| text.contains("out of memory")));
-    assert_eq!(figure(&page, "Ensemble capped"), before);
-    page.get_by(|node| says(node).is_some_and(|text| text == "stopped at update 732 of 732"));
+    until(&mut page, "paused at update 100 of 732, digest");
+    assert_eq!((here.0.borrow().starts, resumed(&here.0.borrow())), (5, 4));
+    assert!(page.query_by(|node| node.role() == Role::Alert).is_none());
+
+    // What the controls have been set to since is trained.
+    die(&mut page);
+    page.state_mut().as_mut().unwrap().set_beta(0.0);
     page.get_by_role_and_label(Role::Button, "Restart the worker").click_accesskit();
     page.run_steps(3);
     settle(&mut page);
-    assert_eq!((here.0.borrow().starts, figure(&page, "Ensemble capped")), (2, before));
-    assert!(page.query_by(|node| node.role() == Role::Alert).is_none());
+    assert!(figure(&page, "Clone ÷ ensemble capped") < 1.2);
 }
 
 /// What the session refuses is said on the page.

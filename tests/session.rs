@@ -451,6 +451,65 @@ fn a_branch_goes_on_from_the_past_and_can_be_made_again() {
     assert_eq!(desk.last().course.turns, [(12, 0.1), (22, 0.3)]);
 }
 
+/// A run whose session has died stands there again as it was seen, whatever had been done with it: moment, number, state and
+/// what comes after; nothing is told twice.
+#[test]
+fn a_run_is_resumed_where_it_was_seen() {
+    let mut desk = Desk::new();
+    desk.load(short(), true);
+    desk.run(1e6);
+    let first = desk.last().run;
+    let mut states = Vec::new();
+    // At the end; looking back; on a branch under way and at its end; a step beyond it.
+    states.push(desk.last().clone());
+    desk.send(Command::Seek { run: first, update: 12 });
+    desk.run(1e6);
+    states.push(desk.last().clone());
+    desk.is_drawing = false;
+    desk.send(Command::Continue { beta: 0.1 });
+    while desk.last().update < 14 {
+        desk.advance();
+        let seen = desk.last().number;
+        desk.send(Command::Seen(seen));
+    }
+    states.push(desk.last().clone());
+    desk.is_drawing = true;
+    let seen = desk.last().number;
+    desk.send(Command::Seen(seen));
+    desk.run(1e6);
+    let end = desk.last().clone();
+    states.push(end.clone());
+    desk.send(Command::Step);
+    desk.run(1e6);
+    states.push(desk.last().clone());
+    assert_eq!(desk.last().course.updates, Some(23));
+    for seen in states {
+        let setup = Setup { config: short(), course: seen.course.clone(), ..Setup::default() };
+        let mut again = Desk::new();
+        let (run, recorded, update) = (seen.run, seen.recorded, seen.update);
+        let is_playing = seen.state == RunState::Playing;
+        again.send(Command::Resume { run, setup: Box::new(setup), recorded, update, is_playing });
+        // What is pressed meanwhile is done afterwards.
+        again.send(Command::Export);
+        while again.snapshots.is_empty() {
+            again.advance();
+        }
+        let now = again.snapshots[0].clone();
+        assert_eq!((now.run, now.state, now.update, now.recorded), (run, seen.state, update, recorded));
+        assert_eq!((now.digest, now.beta, now.last_update), (seen.digest, seen.beta, seen.last_update));
+        assert_eq!((&now.course, now.experts), (&seen.course, seen.experts));
+        assert_eq!((now.curve.len(), again.started.len(), again.refused.len()), (0, 0, 0));
+        assert_eq!((again.exported[0].run, again.exported[0].update), (run, update));
+        again.run(1e6);
+        if is_playing {
+            assert_eq!((again.last().update, again.last().digest), (end.update, end.digest));
+            assert!(again.snapshots.iter().flat_map(|snapshot| &snapshot.curve).all(|point| point.update > recorded));
+        } else {
+            assert_eq!(again.last().number, 1);
+        }
+    }
+}
+
 #[test]
 fn a_course_that_is_none_is_refused() {
     for course in [

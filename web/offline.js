@@ -38,7 +38,11 @@
   }
 
   function reload() {
-    sessionStorage.setItem(RELOADED, "");
+    try {
+      sessionStorage.setItem(RELOADED, "");
+    } catch {
+      // Then the next start does not ask for a newer version to take over either.
+    }
     location.reload();
   }
 

@@ -17,8 +17,9 @@
   /** Until then news is awaited: frames that nobody but egui asks for come after it. */
   let heldUntil = 0;
 
-  /** Where somebody asks for it, every frame is measured (User Timing). */
+  /** Where somebody asks for it, every frame is measured (User Timing). What cannot be painted is not (faults.js). */
   const measured = (callback) => (time) => {
+    if (!window.pageCanPaint()) return;
     const start = performance.now();
     callback(time);
     if (window.apeLabMeasures) performance.measure("ape-lab: frame", { start, end: performance.now() });

@@ -11,7 +11,7 @@ use crate::mdp::{KnownReturns, Policy, Returns};
 
 /// Version of the messages: an old cached worker must not be taken for a new one. [`Event::Ready`] stays the
 /// first variant, so that every version can read every other's.
-pub const PROTOCOL: u32 = 4;
+pub const PROTOCOL: u32 = 5;
 
 /// Longest message, in bytes: the largest ensemble there can be, with its clones and its curve, takes a tenth of it.
 pub const LONGEST: usize = 16_000_000;
@@ -23,6 +23,15 @@ pub enum Command {
     Load {
         setup: Box<Setup>,
         play: bool,
+    },
+    /// Make a run again that a session which has died was at, up to where the page has seen it: it is shown there, at
+    /// `update` of the `recorded` ones, with the number it had, and goes on.
+    Resume {
+        run: u32,
+        setup: Box<Setup>,
+        recorded: u32,
+        update: u32,
+        is_playing: bool,
     },
     /// Begin the same run again, with this β, and show nothing before it has ended. While one is under way
     /// only the last β asked for is kept.

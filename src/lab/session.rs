@@ -79,6 +79,10 @@ pub struct Session {
     next_beta: Option<f64>,
     /// An update of the run to go to.
     seek: Option<u32>,
+    /// Where the run that is being made again was, and whether it played.
+    resuming: Option<(u32, bool)>,
+    /// What is to be done with it once it is there.
+    waiting: Vec<Command>,
     outbox: Vec<Event>,
     /// Something has changed since the last snapshot.
     is_changed: bool,
@@ -105,6 +109,13 @@ impl Session {
 
     /// Takes a command. What is not possible is refused with a sentence and changes nothing.
     pub fn handle(&mut self, command: Command) {
+        let is_about_run = !matches!(
+            command,
+            Command::Load { .. } | Command::Resume { .. } | Command::Speed(_) | Command::Show(_) | Command::Seen(_)
+        );
+        if self.resuming.is_some() && is_about_run {
+            return self.waiting.push(command);
+        }
         if let Err(sentence) = self.carry_out(command) {
             self.outbox.push(Event::Refused(sentence));
         }
@@ -115,6 +126,14 @@ impl Session {
             Command::Load { setup, play } => {
                 self.next_beta = None;
                 self.begin(*setup, play, false)?;
+            }
+            Command::Resume { run, setup, recorded, update, is_playing } => {
+                let mut resumed = Run::new(*setup, true, true)?;
+                resumed.last_update = recorded;
+                resumed.is_playing &= recorded > 0;
+                self.put(resumed);
+                self.runs = run;
+                self.resuming = Some((update, is_playing));
             }
             Command::Retrain { beta } => {
                 let run = self.training()?;
@@ -153,6 +172,7 @@ impl Session {
                 let run = self.training()?;
                 (run.is_playing, run.is_silent) = (false, false);
                 run.last_update = run.last_update.max(run.trainer().updates() + 1);
+                run.set_course_updates();
                 run.update(&|| 0.0);
             }
             Command::Reset => {
@@ -263,52 +283,39 @@ impl Session {
 
     /// Puts a new run in the place of the old one, if its setup is good.
     fn begin(&mut self, setup: Setup, is_playing: bool, is_silent: bool) -> Result<(), String> {
-        let subject = match setup.ensemble.clone().map(EnsembleFile::check) {
-            Some(given) => {
-                let (grid, ensemble) = given.map_err(|error| error.to_string())?;
-                setup.config.check().map_err(|error| error.to_string())?;
-                Subject::Given { grid, ensemble }
-            }
-            None => {
-                let grid = Grid::new(setup.grid.clone()).map_err(|error| error.to_string())?;
-                let trainer = Trainer::new(grid, setup.config.clone()).map_err(|error| error.to_string())?;
-                Subject::Training(Box::new(trainer))
-            }
-        };
-        setup.check().map_err(|error| error.to_string())?;
+        let mut run = Run::new(setup, is_playing, is_silent)?;
         self.runs += 1;
-        let grid = subject.grid();
-        let optimal = optimal_policy(grid);
-        let value = Solver::new(grid).evaluate(&optimal, setup.config.horizon);
-        let optimal = PolicyView::new(&optimal, &value.hitting_time, value.returns.into());
-        self.outbox.push(Event::Started(Box::new(Started {
-            run: self.runs,
-            setup: setup.clone(),
-            optimal: optimal.clone(),
-            branch_of: None,
-        })));
-        let recording = match &subject {
-            Subject::Training(trainer) => Some(Recording::new(trainer, Recording::BUDGET)),
-            Subject::Given { .. } => None,
-        };
-        let is_training = recording.is_some();
-        let mut run = Run {
-            last_update: if is_training { setup.updates() } else { 0 },
-            recording,
-            optimal,
-            is_playing: is_playing && is_training,
-            is_silent,
-            setup,
-            subject,
-            training_ms: 0.0,
-            curve: Vec::new(),
-        };
+        let (setup, optimal) = (run.setup.clone(), run.optimal.clone());
+        self.outbox.push(Event::Started(Box::new(Started { run: self.runs, setup, optimal, branch_of: None })));
         run.add_curve_point();
+        self.put(run);
+        Ok(())
+    }
+
+    fn put(&mut self, run: Run) {
         self.run = Some(run);
         self.seek = None;
+        self.resuming = None;
+        self.waiting.clear();
         self.allowance = 0.0;
         self.is_changed = true;
-        Ok(())
+    }
+
+    /// Where a run that is made again has come as far as it was, it is as it was.
+    fn finish_resuming(&mut self) {
+        let Some(run) = self.run.as_mut().filter(|run| !run.is_playing) else { return };
+        let Some((update, is_playing)) = self.resuming.take() else { return };
+        run.last_update = run.setup.updates();
+        // The page has its curve.
+        run.curve.clear();
+        self.seek = Some(update);
+        self.arrive();
+        if let Some(run) = &mut self.run {
+            run.is_playing = is_playing && run.recording.is_some();
+        }
+        for command in std::mem::take(&mut self.waiting) {
+            self.handle(command);
+        }
     }
 
     /// Trains for a few milliseconds where there is something to train, and makes a snapshot where there is
@@ -317,6 +324,10 @@ impl Session {
         self.arrive();
         let now = clock();
         let mut pace = self.train(now, clock);
+        if self.resuming.is_some() {
+            self.finish_resuming();
+            return Pace::Now;
+        }
         if let Some(run) = &self.run {
             let has_ended = run.is_silent && !run.is_playing;
             if has_ended && self.next_beta.is_some() {
@@ -389,6 +400,43 @@ impl Session {
 const NOTHING: &str = "Nothing has been loaded yet.";
 
 impl Run {
+    /// The start of a run, if its setup is good.
+    fn new(setup: Setup, is_playing: bool, is_silent: bool) -> Result<Run, String> {
+        let subject = match setup.ensemble.clone().map(EnsembleFile::check) {
+            Some(given) => {
+                let (grid, ensemble) = given.map_err(|error| error.to_string())?;
+                setup.config.check().map_err(|error| error.to_string())?;
+                Subject::Given { grid, ensemble }
+            }
+            None => {
+                let grid = Grid::new(setup.grid.clone()).map_err(|error| error.to_string())?;
+                let trainer = Trainer::new(grid, setup.config.clone()).map_err(|error| error.to_string())?;
+                Subject::Training(Box::new(trainer))
+            }
+        };
+        setup.check().map_err(|error| error.to_string())?;
+        let grid = subject.grid();
+        let optimal = optimal_policy(grid);
+        let value = Solver::new(grid).evaluate(&optimal, setup.config.horizon);
+        let optimal = PolicyView::new(&optimal, &value.hitting_time, value.returns.into());
+        let recording = match &subject {
+            Subject::Training(trainer) => Some(Recording::new(trainer, Recording::BUDGET)),
+            Subject::Given { .. } => None,
+        };
+        let is_training = recording.is_some();
+        Ok(Run {
+            last_update: if is_training { setup.updates() } else { 0 },
+            recording,
+            optimal,
+            is_playing: is_playing && is_training,
+            is_silent,
+            setup,
+            subject,
+            training_ms: 0.0,
+            curve: Vec::new(),
+        })
+    }
+
     fn trainer(&self) -> &Trainer {
         match &self.subject {
             Subject::Training(trainer) => trainer,

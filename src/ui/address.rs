@@ -64,8 +64,9 @@ impl App {
 
     /// Puts what is on the page into the address, where that has changed and it is time.
     pub(super) fn update_address(&mut self, ctx: &Context) {
-        // Until the first run is there, or the promised moment, the address is the visitor's.
-        if self.shown.is_none() || self.promise.is_some() || self.is_playing() {
+        // Until the first run is there, or the promised moment, the address is the visitor's. While a run plays it says how
+        // to make it again.
+        if self.shown.is_none() || self.promise.is_some() {
             return;
         }
         let wait = self.address.1 + PAUSE - self.now;

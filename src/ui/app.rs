@@ -103,10 +103,18 @@ pub enum Session {
     Failed(String),
 }
 
+/// How often a session that has died is started again by itself: so many times in so many seconds.
+const MOST_RESTARTS: usize = 3;
+const WITHIN: f64 = 60.0;
+
 /// The page.
 pub struct App {
     pub(super) link: Box<dyn Link>,
     pub(super) session: Session,
+    /// When it was started again by itself.
+    restarts: Vec<f64>,
+    /// Whether the session that has died showed its last run: another can go on with it.
+    can_resume: bool,
     /// What the controls say; the session is told of every change.
     pub(super) setup: Setup,
     /// The place in [`PRESETS`] that `setup` was taken from, as long as nothing was changed since.
@@ -119,6 +127,8 @@ pub struct App {
     pub(super) notice: Option<String>,
     pub view: View,
     pub preferences: Preferences,
+    /// Whether the visitor has been told that preferences are not kept.
+    pub(super) is_forgetful: bool,
     /// Runs that stay on the page to compare with.
     pub kept: Vec<Kept>,
     pub palette: PaletteWindow,
@@ -173,6 +183,8 @@ impl App {
         let mut app = App {
             link,
             session: Session::Starting,
+            restarts: Vec::new(),
+            can_resume: false,
             setup: Setup::default(),
             preset: None,
             begun: None,
@@ -195,6 +207,7 @@ impl App {
                 is_by_keyboard: false,
             },
             preferences: Preferences::default(),
+            is_forgetful: false,
             kept: Vec::new(),
             palette: PaletteWindow::default(),
             is_new: false,
@@ -220,6 +233,14 @@ impl App {
         app.is_new = app.host.kept("visited").is_none();
         app.load_preset(0);
         app
+    }
+
+    /// Goes on in another context, as when the browser has taken the old one's graphics away.
+    pub fn move_to(&mut self, ctx: &egui::Context) {
+        theme::install(ctx);
+        self.apply_preferences(ctx);
+        // They were made with the old one's letters.
+        self.pictures = Pictures::default();
     }
 
     /// What the controls say.
@@ -451,12 +472,16 @@ impl App {
             match event {
                 Ok(Event::Ready { protocol }) if protocol == PROTOCOL => {
                     self.session = Session::Ready;
-                    // Of a session that is gone nothing comes any more, and its runs had other numbers.
-                    self.wanted.clear();
-                    self.slow_clones.clear(&mut self.pool);
                     self.send(Command::Speed(toolbar::SPEEDS[self.view.speed]));
                     self.send(Command::Show(self.view.clones.clone()));
-                    self.send_setup();
+                    match self.resumption() {
+                        Some(resume) => self.send(resume),
+                        None => {
+                            // The runs of a session that is gone had other numbers.
+                            self.slow_clones.clear(&mut self.pool);
+                            self.send_setup();
+                        }
+                    }
                 }
                 Ok(Event::Ready { .. }) => {
                     let sentence = "The worker is of another version than the page: reload the page.";
@@ -478,7 +503,7 @@ impl App {
                     self.wanted.clear();
                     self.notice = Some(sentence);
                 }
-                Err(sentence) => self.lose(sentence),
+                Err(sentence) => self.lose_session(sentence),
             }
         }
         for (id, event) in self.pool.receive() {
@@ -498,16 +523,9 @@ impl App {
         }
     }
 
-    /// The session is gone.
-    fn lose(&mut self, sentence: String) {
-        self.session = Session::Failed(sentence);
-        self.begun = None;
-        self.wanted.clear();
-    }
-
     /// What the worker says makes no sense.
     fn distrust(&mut self, why: &str) {
-        self.lose(format!("The worker has sent what cannot be shown ({why})."));
+        self.lose_session(format!("The worker has sent what cannot be shown ({why})."));
     }
 
     /// Whether a snapshot is one of its run; of a run that is not on the page it does not matter.
@@ -519,6 +537,48 @@ impl App {
             (None, Some(shown)) => snapshot.check(&shown.grid),
             (None, None) => Ok(()),
         }
+    }
+
+    /// The session has died. One that was at work is started again, unless that has been of no use.
+    fn lose_session(&mut self, sentence: String) {
+        let was_at_work = matches!(self.session, Session::Ready);
+        self.can_resume = self.begun.take().is_none() && (was_at_work || self.can_resume);
+        self.wanted.clear();
+        self.restarts.retain(|at| self.now - at < WITHIN);
+        if !was_at_work || self.restarts.len() >= MOST_RESTARTS {
+            self.session = Session::Failed(sentence);
+            // It said that another had taken its place.
+            self.notice = None;
+            return;
+        }
+        self.restarts.push(self.now);
+        self.notice = Some(match self.resumption() {
+            Some(_) => {
+                let sentence = sentence.trim_end_matches('.');
+                format!("{sentence}: it was started again and goes on from update {}.", self.moment())
+            }
+            None => format!("{} It was started again.", sentence),
+        });
+        self.restart_session();
+    }
+
+    pub(super) fn restart_session(&mut self) {
+        self.session = Session::Starting;
+        self.link.restart();
+    }
+
+    /// What tells another session of the run on the page, where the controls still say the same.
+    fn resumption(&self) -> Option<Command> {
+        let Shown { started, snapshot, .. } = self.shown.as_ref().filter(|_| self.can_resume)?;
+        let setup = Setup { course: snapshot.course.clone(), ..started.setup.clone() };
+        let is_same = setup == self.setup && snapshot.state != RunState::Given;
+        is_same.then(|| Command::Resume {
+            run: snapshot.run,
+            setup: Box::new(setup),
+            recorded: snapshot.recorded,
+            update: self.moment(),
+            is_playing: snapshot.state == RunState::Playing && self.view.sought.is_none(),
+        })
     }
 
     /// An ensemble has come: to each of those who wanted it.

@@ -5,7 +5,7 @@ use egui::{Grid, Label, RichText, Slider, Ui, vec2};
 use super::app::{App, BetaMode, View};
 use super::numbers;
 use super::theme::{self, Palette, SPACE};
-use super::widgets::{choose, spoken};
+use super::widgets::{choose, choose_wrapped, spoken};
 use crate::ape::{Config, Field};
 use crate::lab::{RunState, Snapshot, Started};
 use crate::mdp::{KnownReturns, RETURN_KINDS, Returns};
@@ -132,14 +132,14 @@ fn figures(ui: &mut Ui, app: &mut App, columns: usize) {
             ui.end_row();
         }
     });
-    ui.horizontal(|ui| {
+    ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing.x = theme::GAP;
         if columns > 2 {
             ui.label(RichText::new("return:").small().color(palette.muted));
         }
         let options: Vec<(usize, &str, &str)> =
             RETURN_KINDS.iter().enumerate().map(|(index, kind)| (index, kind.label, kind.help)).collect();
-        choose(ui, "Return", &mut app.view.kind, &options);
+        choose_wrapped(ui, "Return", &mut app.view.kind, &options);
     });
 }
 

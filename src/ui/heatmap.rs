@@ -175,7 +175,9 @@ pub fn color_bar(ui: &mut Ui, color_map: usize) {
         ui.spacing_mut().item_spacing.x = 6.0;
         text(ui, "Return from a cell, capped:");
         text(ui, "−100");
-        let (rect, _) = ui.allocate_exact_size(vec2(110.0, 10.0), Sense::hover());
+        // There is room for what stands behind it.
+        let width = (ui.available_width() - 54.0).clamp(40.0, 110.0);
+        let (rect, _) = ui.allocate_exact_size(vec2(width, 10.0), Sense::hover());
         let mut mesh = Mesh::default();
         const STOPS: u32 = 24;
         for i in 0..=STOPS {

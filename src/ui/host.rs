@@ -50,6 +50,11 @@ pub trait Host {
         None
     }
 
+    /// A fault and what helps to find it, as a text to hand on.
+    fn report(&self, fault: &str) -> String {
+        format!("ape-lab {}\n{fault}", env!("CARGO_PKG_VERSION"))
+    }
+
     /// Whether the visitor has asked the system for less motion.
     fn wants_less_motion(&self) -> bool {
         false

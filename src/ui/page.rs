@@ -168,28 +168,44 @@ impl App {
     /// What has gone wrong, and what can be done about it.
     fn show_messages(&mut self, ui: &mut Ui) {
         let palette = Palette::of(ui);
-        let message = |ui: &mut Ui, sentence: &str, button: &str| -> bool {
+        let message = |ui: &mut Ui, sentence: &str, buttons: &[&str]| -> Option<usize> {
             theme::card(ui)
                 .stroke(egui::Stroke::new(1.5, palette.warning))
                 .show(ui, |ui| {
-                    ui.horizontal_wrapped(|ui| {
+                    let say = |ui: &mut Ui| {
                         let label = ui.label(RichText::new(sentence).color(palette.warning));
                         ui.ctx().accesskit_node_builder(label.id, |node| node.set_role(egui::Role::Alert));
-                        ui.button(button).clicked()
+                    };
+                    let offer = |ui: &mut Ui| {
+                        let mut clicked = None;
+                        for (index, button) in buttons.iter().enumerate() {
+                            clicked = ui.button(*button).clicked().then_some(index).or(clicked);
+                        }
+                        clicked
+                    };
+                    if ui.available_width() < WIDE {
+                        say(ui);
+                        return ui.horizontal_wrapped(offer).inner;
+                    }
+                    ui.horizontal_wrapped(|ui| {
+                        say(ui);
+                        offer(ui)
                     })
                     .inner
                 })
                 .inner
         };
         if let Session::Failed(sentence) = &self.session {
-            let sentence = format!("{sentence} What is on the page stays; training needs a new worker.");
-            if message(ui, &sentence, "Restart the worker") {
-                self.session = Session::Starting;
-                self.link.restart();
+            let shown = format!("{sentence} What is on the page stays; training needs a new worker.");
+            let report = sentence.clone();
+            match message(ui, &shown, &["Restart the worker", "Copy the report"]) {
+                Some(0) => self.restart_session(),
+                Some(_) => ui.ctx().copy_text(self.host.report(&report)),
+                None => {}
             }
         }
         if let Some(sentence) = self.notice.clone()
-            && message(ui, &sentence, "Dismiss")
+            && message(ui, &sentence, &["Dismiss"]).is_some()
         {
             self.notice = None;
         }

@@ -70,13 +70,16 @@ impl App {
         if preferences != self.preferences {
             self.preferences = preferences;
             self.apply_preferences(ctx);
-            if let Ok(text) = serde_json::to_string(&preferences) {
-                self.notice = self.host.keep(NAME, &text).err();
+            let Ok(text) = serde_json::to_string(&preferences) else { return };
+            if let Err(sentence) = self.host.keep(NAME, &text)
+                && !std::mem::replace(&mut self.is_forgetful, true)
+            {
+                self.notice = Some(format!("{sentence} What you set here holds until the page is reloaded."));
             }
         }
     }
 
-    fn apply_preferences(&mut self, ctx: &Context) {
+    pub(super) fn apply_preferences(&mut self, ctx: &Context) {
         self.view.color_map = self.preferences.color_map;
         ctx.set_theme(match self.preferences.theme {
             Theme::System => ThemePreference::System,

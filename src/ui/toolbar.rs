@@ -16,12 +16,20 @@ pub const SPEEDS: [Option<f32>; 9] =
 /// The place in [`SPEEDS`] that the page opens with: a whole run of the paper in two and a half seconds.
 pub const DEFAULT_SPEED: usize = 5;
 
+/// Width of the page under which its name stands over its buttons.
+const TINY: f32 = 360.0;
+
 pub fn show(ui: &mut Ui, app: &mut App) {
     if ui.available_width() < theme::NARROW {
-        ui.horizontal(|ui| {
+        if ui.available_width() < TINY {
             heading(ui, 1, RichText::new("ape-lab").heading());
-            at_the_right(ui, app);
-        });
+            ui.horizontal(|ui| at_the_right(ui, app));
+        } else {
+            ui.horizontal(|ui| {
+                heading(ui, 1, RichText::new("ape-lab").heading());
+                at_the_right(ui, app);
+            });
+        }
         ui.horizontal(|ui| {
             presets(ui, app);
             transport(ui, app);

@@ -116,6 +116,10 @@ impl Host for Files {
         storage()?.get_item(&key(name)).ok()?
     }
 
+    fn report(&self, fault: &str) -> String {
+        super::faults::report(fault)
+    }
+
     fn wants_less_motion(&self) -> bool {
         let query = web_sys::window().and_then(|window| window.match_media("(prefers-reduced-motion: reduce)").ok()?);
         query.is_some_and(|query| query.matches())

@@ -2,6 +2,7 @@
 
 #[cfg(feature = "page")]
 mod aria;
+mod faults;
 #[cfg(feature = "page")]
 mod files;
 #[cfg(feature = "page")]

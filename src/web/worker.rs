@@ -3,6 +3,7 @@
 
 use std::cell::{Cell, RefCell};
 use std::collections::VecDeque;
+use std::fmt::Debug;
 use std::rc::Rc;
 
 use js_sys::{Array, ArrayBuffer, Uint8Array};
@@ -11,7 +12,7 @@ use serde::de::DeserializeOwned;
 use wasm_bindgen::prelude::*;
 use web_sys::{DedicatedWorkerGlobalScope, ErrorEvent, MessageChannel, MessageEvent, Worker, WorkerOptions};
 
-use super::measures;
+use super::{faults, measures};
 use crate::experiment::Task;
 use crate::lab::{Command, Event, Hand, Link, PROTOCOL, Pace, Pool, Session, TaskEvent, decode, encode};
 
@@ -34,7 +35,11 @@ extern "C" {
 
 /// A worker, and what it has said: messages of type `E`.
 struct Line<E> {
+    /// What it does: [`SESSION`] or [`TASKS`].
+    role: &'static str,
     worker: Option<Worker>,
+    /// Whether what it says, or that it is gone, is of interest.
+    is_open: Rc<Cell<bool>>,
     inbox: Rc<RefCell<VecDeque<Result<E, String>>>>,
     /// What the worker calls; kept as long as it may.
     handlers: Option<Handlers>,
@@ -45,14 +50,17 @@ struct Handlers {
     _on_error: Closure<dyn Fn(ErrorEvent)>,
 }
 
-impl<E: DeserializeOwned + 'static> Line<E> {
+impl<E: DeserializeOwned + Debug + 'static> Line<E> {
     const SCRIPT: &str = "./worker_loader.js";
 
-    /// Starts a worker of this name; `wake` is called with each message that arrives.
-    fn open(name: &str, wake: Rc<dyn Fn(&Result<E, String>)>) -> Line<E> {
-        let mut line = Line { worker: None, inbox: Rc::default(), handlers: None };
+    /// Starts a worker; `wake` is called with each message that arrives.
+    fn open(role: &'static str, wake: Rc<dyn Fn(&Result<E, String>)>) -> Line<E> {
+        let is_open = Rc::new(Cell::new(true));
+        let mut line = Line { role, worker: None, is_open: is_open.clone(), inbox: Rc::default(), handlers: None };
         let options = WorkerOptions::new();
-        options.set_name(name);
+        // The worker holds a lock of its name (web/worker_loader.js): no two have the same.
+        let name = format!("{role} {}", js_sys::Math::random());
+        options.set_name(&name);
         let worker = match Worker::new_with_options(Self::SCRIPT, &options) {
             Ok(worker) => worker,
             Err(error) => {
@@ -64,12 +72,25 @@ impl<E: DeserializeOwned + 'static> Line<E> {
         let deliver = {
             let inbox = line.inbox.clone();
             move |event: Result<E, String>| {
+                match &event {
+                    Ok(event) => faults::note("from", role, event),
+                    Err(_) => faults::note("from", role, &format_args!("failure")),
+                }
                 wake(&event);
                 inbox.borrow_mut().push_back(event);
             }
         };
         let on_error = deliver.clone();
+        let is_heard = Cell::new(false);
         let on_message = Closure::<dyn Fn(MessageEvent)>::new(move |message: MessageEvent| {
+            if !is_heard.replace(true) {
+                let (deliver, is_open) = (deliver.clone(), is_open.clone());
+                faults::on_gone(&name, move || {
+                    if is_open.get() {
+                        deliver(Err("The worker has stopped (the browser has ended it).".to_owned()));
+                    }
+                });
+            }
             deliver(match message.data().dyn_into::<ArrayBuffer>() {
                 Ok(buffer) => decode(&Uint8Array::new(&buffer).to_vec()),
                 Err(other) => Err(other.as_string().unwrap_or_default()),
@@ -89,16 +110,20 @@ impl<E: DeserializeOwned + 'static> Line<E> {
         line
     }
 
-    fn send(&self, message: &impl Serialize) {
+    fn send(&self, message: &(impl Serialize + Debug)) {
         let Some(worker) = &self.worker else { return };
+        faults::note("to", self.role, message);
         let buffer = Uint8Array::from(&encode(message)[..]).buffer();
         if let Err(error) = worker.post_message_with_transfer(&buffer, &Array::of1(&buffer)) {
             self.inbox.borrow_mut().push_back(Err(format!("The worker could not be reached ({error:?}).")));
         }
     }
 
-    /// The next message; after a failure the worker is gone.
+    /// The next message; after a failure the worker is gone, and its first reason is the one that counts.
     fn receive(&mut self) -> Option<Result<E, String>> {
+        if !self.is_open.get() {
+            return None;
+        }
         let event = self.inbox.borrow_mut().pop_front()?;
         if event.is_err() {
             self.close();
@@ -109,6 +134,7 @@ impl<E: DeserializeOwned + 'static> Line<E> {
 
 impl<E> Line<E> {
     fn close(&mut self) {
+        self.is_open.set(false);
         if let Some(worker) = self.worker.take() {
             worker.set_onmessage(None);
             worker.set_onerror(None);
@@ -215,9 +241,14 @@ impl Hand for WorkerHand {
 
 /// The worker's end: what its name says.
 pub fn run() {
-    console_error_panic_hook::set_once();
     let scope: DedicatedWorkerGlobalScope = js_sys::global().unchecked_into();
-    if scope.name() == TASKS { do_tasks(scope) } else { run_session(scope) }
+    let page = scope.clone();
+    std::panic::set_hook(Box::new(move |info| {
+        console_error_panic_hook::hook(info);
+        // A string is a failure's sentence.
+        let _ = page.post_message(&format!("The worker has stopped ({}).", faults::words(info)).into());
+    }));
+    if scope.name().starts_with(TASKS) { do_tasks(scope) } else { run_session(scope) }
 }
 
 fn post(scope: &DedicatedWorkerGlobalScope, event: &impl Serialize) {

@@ -237,24 +237,10 @@ test("a worker that cannot be loaded is said, and can be started again", async (
   await close();
 });
 
-test("a worker that dies leaves the page as it was", async () => {
-  const { page, close } = await open(browser, site.address);
-  await trained(page);
-  const ensemble = await figure(page, "Ensemble");
-  await page.workers()[0].evaluate(() => setTimeout(() => { throw new Error("out of luck"); }));
-  await page.getByRole("alert").filter({ hasText: "out of luck" }).waitFor(PATIENCE);
-  assert.equal(await figure(page, "Ensemble"), ensemble);
-  await click(page, "button", "Restart the worker");
-  await until(() => page.getByRole("alert").count(), (count) => count === 0);
-  await trained(page);
-  assert.equal(await until(() => figure(page, "Ensemble"), (value) => value === ensemble), ensemble);
-  await close();
-});
-
 test("a program that cannot be loaded is said", async () => {
   for (const files of ["**/app-*.js", "**/app-*.wasm"]) {
     const { page, close } = await open(browser, site.address, { before: (page) => page.route(files, (route) => route.abort()) });
-    await page.getByText("could not be loaded").waitFor(PATIENCE);
+    await page.getByRole("alert").filter({ hasText: "could not be loaded" }).waitFor(PATIENCE);
     await close();
   }
 });
@@ -266,7 +252,7 @@ test("without WebGL 2, WebAssembly or workers the page says what is missing", as
     ["WebAssembly", () => { delete window.WebAssembly; }],
   ]) {
     const { page, close } = await open(browser, site.address, { before: (page) => page.addInitScript(script) });
-    await page.getByText("does not offer " + name).waitFor(PATIENCE);
+    await page.getByRole("alert").filter({ hasText: "does not offer " + name }).waitFor(PATIENCE);
     await page.waitForTimeout(500);
     assert.ok(await page.locator("#message").isVisible());
     await close();
