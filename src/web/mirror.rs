@@ -9,7 +9,8 @@ use std::cell::RefCell;
 use egui::accesskit::{Live, Node, NodeId, Role, TreeUpdate};
 use egui::{Context, FullOutput, Plugin, RawInput};
 use fnv::{FnvHashMap as HashMap, FnvHashSet as HashSet};
-use web_sys::Element;
+use wasm_bindgen::JsCast as _;
+use web_sys::{Element, HtmlElement};
 
 use super::aria::{self, Kind, Relations, Said};
 use super::hands::Hands;
@@ -166,7 +167,11 @@ impl Elements {
         }
         for attribute in &said.attributes {
             if !old.attributes.contains(attribute) {
-                let _ = element.set_attribute(attribute.0, &attribute.1);
+                match attribute {
+                    // The page's policy allows no style that is given as text, as HTML would (index.html).
+                    ("style", style) => element.unchecked_ref::<HtmlElement>().style().set_css_text(style),
+                    (name, value) => element.set_attribute(name, value).unwrap_or_default(),
+                }
             }
         }
         if old.text != said.text {

@@ -19,7 +19,7 @@ use crate::ui::App;
 
 #[wasm_bindgen]
 extern "C" {
-    /// Shows a sentence in place of the page (index.html).
+    /// Shows a sentence in place of the page (web/failures.js).
     #[wasm_bindgen(js_name = failPage)]
     fn fail_page(sentence: &str);
 
@@ -62,7 +62,7 @@ async fn run() -> Result<(), String> {
     tell("pageVersion", env!("CARGO_PKG_VERSION").into())?;
     let message = element(&document, "message")?;
     if message.get_attribute("role").as_deref() == Some("alert") {
-        // index.html has found something missing and says so.
+        // web/failures.js has found something missing and says so.
         return Ok(());
     }
     // Whatever keeps it from telling, the version that is here starts.
