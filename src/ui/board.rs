@@ -25,8 +25,6 @@ pub struct Shown {
     pub grid: Grid,
 }
 
-/// Width under which two panels beside each other have no room for their titles.
-const TINY: f32 = 330.0;
 /// What a card adds to the height of its contents.
 const CARD: f32 = 22.0;
 
@@ -61,11 +59,7 @@ impl Shown {
         ui.add_space(GAP);
         heatmap::color_bar(ui, view.color_map);
         let width = ui.available_width();
-        let columns = match width {
-            ..TINY => 1,
-            ..NARROW => 2,
-            _ => 3,
-        };
+        let columns = if width < NARROW { 2 } else { 3 };
         let plan = Plan::stacked(width, columns, &self.grid);
         let panels = panels::list(&self.started, &self.snapshot, view);
         let mut touched = self.show_panels(ui, &panels, &plan, view, pictures);

@@ -67,8 +67,10 @@ pub fn show(ui: &mut Ui, app: &mut App) {
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing.x = 1.0;
         ui.spacing_mut().button_padding.x = 2.0;
-        // All in one row, and wide enough for a finger where there is room.
-        let width = ((ui.available_width() - 7.0) / Config::MAX_EXPERTS as f32).floor().min(40.0);
+        // Wide enough for a finger on a narrow page, and all in one row elsewhere.
+        let in_one_row = ((ui.available_width() - 7.0) / Config::MAX_EXPERTS as f32).floor().min(40.0);
+        let is_narrow = ui.ctx().content_rect().width() < super::theme::NARROW;
+        let width = if is_narrow { 40.0 } else { in_one_row };
         for n in 1..=Config::MAX_EXPERTS {
             let button = egui::Button::selectable(config.experts == n, n.to_string()).frame_when_inactive(true);
             let response = ui.add(button.min_size(egui::vec2(width, 0.0)));

@@ -120,6 +120,8 @@ pub struct Plan {
 /// Least width of chart and inspector at the right, and least height below.
 const REST_RIGHT: f32 = 340.0;
 const REST_BELOW: f32 = 210.0;
+/// Width under which panels stand below each other.
+const TINY: f32 = 330.0;
 
 impl Plan {
     /// The plan with the largest pictures.
@@ -142,8 +144,9 @@ impl Plan {
         plans.reduce(|best, plan| if plan.picture.x > best.picture.x { plan } else { best }).expect("a page has panels")
     }
 
-    /// So many columns over a width, as high as they come.
+    /// So many columns over a width, as high as they come; one where two have no room for their titles.
     pub fn stacked(width: f32, columns: usize, grid: &Grid) -> Plan {
+        let columns = if width < TINY { 1 } else { columns };
         let picture = ((width - 2.0 * GAP * (columns - 1) as f32) / columns as f32).floor();
         Plan {
             columns,

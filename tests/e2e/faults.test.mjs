@@ -136,13 +136,16 @@ test("a worker that dies again and again is not started for ever", async () => {
   }
   await alert(page, "training needs a new worker").waitFor(PATIENCE);
   assert.equal(await page.evaluate(() => window.watch.workers.length), 4);
-  await pictures(page, "worker-failed");
   await click(page, "button", "Copy the report");
   const report = await until(() => page.evaluate(() => navigator.clipboard.readText()), (text) => text !== "");
   for (const line of [/^ape-lab \d+\.\d+\.\d+$/m, /capacity overflow, .*\.rs:\d+/, /to session: Resume/, /from session: Snapshot/, /speed=60/]) {
     assert.match(report, line);
   }
+  await pictures(page, "worker-failed");
   const now = await shownUpdate(page);
+  // Once the page has its old width again, the button has come to its place.
+  const restart = widget(page, "button", "Restart the worker");
+  await until(async () => (await restart.boundingBox())?.x ?? 0, (x) => x > PHONE.width);
   await click(page, "button", "Restart the worker");
   await until(() => shownUpdate(page), (update) => update > now);
   await close();
