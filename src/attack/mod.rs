@@ -95,7 +95,7 @@ pub struct Attacker {
     /// The numbers with which it takes part in a comparison of all; empty without a parameter.
     pub usual: &'static [u32],
     /// Whether it is fast enough to be made anew while training goes on; [`AttackerChoice::is_quick`] knows its number too.
-    is_quick: bool,
+    pub is_quick: bool,
     pub remembers: bool,
     /// Makes the clone; nothing when it was told to stop.
     clone: fn(&Target, u32, &mut Progress) -> Option<Cloned>,

@@ -20,13 +20,15 @@ pub trait Hand {
 /// The number of a task, by which its news are told apart.
 pub type TaskId = u32;
 
+type Numbered = (TaskId, Task);
+
 /// Tasks, and the hands that do them. Hands are hired when there is work for them.
 pub struct Pool {
     hire: Box<dyn Fn() -> Box<dyn Hand>>,
     most: usize,
     /// Each with the task at hand.
-    hands: Vec<(Box<dyn Hand>, Option<(TaskId, Task)>)>,
-    queue: VecDeque<(TaskId, Task)>,
+    hands: Vec<(Box<dyn Hand>, Option<Numbered>)>,
+    queue: VecDeque<Numbered>,
     begun: TaskId,
 }
 
