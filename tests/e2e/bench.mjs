@@ -75,12 +75,17 @@ const forget = (page) => page.evaluate(() => (performance.clearMarks(), performa
 const whenAtRest = (page) =>
   page.addInitScript(() => {
     const post = Worker.prototype.postMessage;
-    const RETRAIN = 1;
+    // Its place in src/lab/protocol.rs; β follows.
+    const RETRAIN = 2;
     Worker.prototype.postMessage = function (message, transfer) {
       if (new Uint8Array(message)[0] !== RETRAIN) return post.call(this, message, transfer);
       // A buffer of its own, as the page's time to give it away is over.
       const copy = message.slice(0);
-      setTimeout(() => post.call(this, copy, [copy]), 400);
+      setTimeout(() => {
+        // That the run has begun is not painted either (web/rest.js).
+        window.holdPage(300);
+        post.call(this, copy, [copy]);
+      }, 400);
     };
   });
 
