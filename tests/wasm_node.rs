@@ -11,6 +11,7 @@ use wasm_bindgen_test::wasm_bindgen_test;
 #[wasm_bindgen_test]
 fn a_seed_gives_the_same_bits_under_node() {
     golden::check();
+    golden::check_presets();
     golden::check_clones();
 }
 

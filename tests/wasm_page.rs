@@ -16,6 +16,7 @@ wasm_bindgen_test_configure!(run_in_browser);
 #[wasm_bindgen_test]
 fn a_seed_gives_the_same_bits_on_a_page() {
     golden::check();
+    golden::check_presets();
     golden::check_clones();
 }
 

@@ -14,6 +14,7 @@ wasm_bindgen_test_configure!(run_in_dedicated_worker);
 #[wasm_bindgen_test]
 fn a_seed_gives_the_same_bits_in_a_worker() {
     golden::check();
+    golden::check_presets();
     golden::check_clones();
 }
 

@@ -6,7 +6,32 @@ use std::hash::Hasher;
 
 use ape_lab::ape::{AlgorithmKind, BaselineKind, Config, GradientKind, ReturnToGo, Trainer};
 use ape_lab::attack::{AttackerChoice, Target};
+use ape_lab::experiment::{PRESETS, Preset};
 use ape_lab::mdp::{Grid, GridSpec};
+
+/// Of every preset that trains, with some seeds, after a run of 40 updates: preset, seed, digest. `cargo xtask test release`
+/// compares the optimised command line with it, too.
+const PRESETS_AND_SEEDS: &str = include_str!("presets.csv");
+
+/// Trains every preset with every seed of the table and compares.
+pub fn check_presets() {
+    let mut found = Vec::new();
+    for line in PRESETS_AND_SEEDS.lines().skip(1) {
+        let [name, seed, expected] = line.split(',').collect::<Vec<_>>()[..] else { panic!("{line}") };
+        let setup = (Preset::find(name).unwrap().setup)();
+        let config = Config { seed: seed.parse().unwrap(), total_steps: 40 * 4096, exact_updates: 40, ..setup.config };
+        assert_eq!(config.updates(), 40);
+        let mut trainer = Trainer::new(Grid::new(setup.grid).unwrap(), config).unwrap();
+        (0..40).for_each(|_| trainer.update());
+        found.push(format!("{name},{seed},{:016x}", trainer.digest()));
+        assert_eq!(found.last().unwrap(), &format!("{name},{seed},{expected}"));
+    }
+    let trains = |preset: &&Preset| (preset.setup)().ensemble.is_none();
+    for preset in PRESETS.iter().filter(trains) {
+        let seeds = found.iter().filter(|line| line.starts_with(&format!("{},", preset.name))).count();
+        assert_eq!(seeds, 3, "{}", preset.name);
+    }
+}
 
 /// Trains every configuration for 50 updates and compares.
 pub fn check() {
