@@ -33,6 +33,9 @@ extern "C" {
     fn tell_page(can_wait: bool) -> Result<bool, JsValue>;
 }
 
+/// What is called with each message that arrives.
+type Wake<E> = Rc<dyn Fn(&Result<E, String>)>;
+
 /// A worker, and what it has said: messages of type `E`.
 struct Line<E> {
     /// What it does: [`SESSION`] or [`TASKS`].
@@ -54,7 +57,7 @@ impl<E: DeserializeOwned + Debug + 'static> Line<E> {
     const SCRIPT: &str = "./worker_loader.js";
 
     /// Starts a worker; `wake` is called with each message that arrives.
-    fn open(role: &'static str, wake: Rc<dyn Fn(&Result<E, String>)>) -> Line<E> {
+    fn open(role: &'static str, wake: Wake<E>) -> Line<E> {
         let is_open = Rc::new(Cell::new(true));
         let mut line = Line { role, worker: None, is_open: is_open.clone(), inbox: Rc::default(), handlers: None };
         let options = WorkerOptions::new();
@@ -151,7 +154,7 @@ impl<E> Drop for Line<E> {
 
 /// The page's end of the session.
 pub struct WorkerLink {
-    wake: Rc<dyn Fn(&Result<Event, String>)>,
+    wake: Wake<Event>,
     line: Line<Event>,
     /// Run and update of the snapshot that has come last.
     latest: Option<(u32, u32)>,
@@ -160,7 +163,7 @@ pub struct WorkerLink {
 impl WorkerLink {
     /// Starts the worker; `wake` is called when an event has arrived that is to be painted.
     pub fn new(wake: impl Fn() + 'static) -> WorkerLink {
-        let wake: Rc<dyn Fn(&Result<Event, String>)> = Rc::new(move |event| {
+        let wake: Wake<Event> = Rc::new(move |event| {
             // A run that has begun has nothing to show yet. Where there is no page around, as in tests, nothing rests.
             if tell_page(matches!(event, Ok(Event::Started(_)))).unwrap_or(true) {
                 wake();
@@ -196,7 +199,7 @@ impl Link for WorkerLink {
 
 /// A pool of workers, one for each core: while they work the session mostly rests.
 pub fn worker_pool(wake: impl Fn() + 'static) -> Pool {
-    let wake: Rc<dyn Fn(&Result<TaskEvent, String>)> = Rc::new(move |_| wake());
+    let wake: Wake<TaskEvent> = Rc::new(move |_| wake());
     let cores = web_sys::window().map_or(1.0, |window| window.navigator().hardware_concurrency());
     Pool::new(cores as usize, move || {
         Box::new(WorkerHand { wake: wake.clone(), line: None, is_ready: false, next: None })
@@ -205,7 +208,7 @@ pub fn worker_pool(wake: impl Fn() + 'static) -> Pool {
 
 /// A worker that does tasks.
 struct WorkerHand {
-    wake: Rc<dyn Fn(&Result<TaskEvent, String>)>,
+    wake: Wake<TaskEvent>,
     line: Option<Line<TaskEvent>>,
     is_ready: bool,
     /// A task for when the worker listens.

@@ -2,7 +2,7 @@
 import assert from "node:assert/strict";
 import { after, before, test } from "node:test";
 import { launch, open, serve } from "./browser.mjs";
-import { PATIENCE, SHOTS, click, digest, downloaded, figure, press, says, status, trained, until, widget } from "./visitor.mjs";
+import { PATIENCE, SHOTS, click, digest, downloaded, drawn, figure, press, says, status, trained, until, widget } from "./visitor.mjs";
 
 let browser, site;
 before(async () => {
@@ -99,10 +99,10 @@ test("a maze is drawn by mouse and keyboard, what spoils it is left out, and it 
     await page.mouse.down();
     for (const cell of cells) {
       await page.mouse.move(...at(...cell), { steps: 4 });
-      await page.waitForTimeout(60);
+      await drawn(page);
     }
     await page.mouse.up();
-    await page.waitForTimeout(150);
+    await drawn(page);
   };
   await stroke([2, 0], [2, 8]);
   await stroke([5, 1], [5, 9]);
@@ -248,7 +248,7 @@ test("a broken or old link gets a sentence and the default", async () => {
     ["v=1&at=5000", "at=5000: expected an update of the run, 0 to 732"],
     ["v=1&step=99", "step=99: expected a number from 1 to 10"],
     ["v=1&experts=%E2%82", "experts"],
-    ["v=1&" + "x".repeat(60_000) + "=1", "characters long"],
+    ["v=1&" + "x".repeat(60_000) + "=1", "it is 60006 bytes long, expected at most 50000"],
     ["v=1&file=mine.json", "This link shows the ensemble of mine.json, which is not in the link"],
   ]) {
     const { page, problems, close } = await open(browser, `${site.address}#${fragment}`);
@@ -385,11 +385,11 @@ test("text can be larger, and nothing is cut off", async () => {
   await trained(page);
   await click(page, "button", "Settings");
   await click(page, "radio", "Text size: 160 %");
-  await page.waitForTimeout(500);
+  await drawn(page);
   await press(page, "Escape");
   for (const tab of ["1", "2", "3", "4", "5", "6", "7"]) {
     await press(page, tab);
-    await page.waitForTimeout(400);
+    await drawn(page);
     const beyond = await page.evaluate(() =>
       [...document.querySelectorAll("#mirror *")].filter((e) => e.getBoundingClientRect().right > innerWidth + 1).map((e) => e.outerHTML.slice(0, 200)),
     );

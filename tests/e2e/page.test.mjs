@@ -2,7 +2,7 @@
 import assert from "node:assert/strict";
 import { after, before, test } from "node:test";
 import { launch, open, serve } from "./browser.mjs";
-import { PATIENCE, SHOTS, click, downloaded, figure, status, trained, until } from "./visitor.mjs";
+import { PATIENCE, SHOTS, click, downloaded, drawn, figure, press, status, trained, until } from "./visitor.mjs";
 
 let browser, site;
 before(async () => {
@@ -30,8 +30,7 @@ test("the page trains by itself, and β moved with the keyboard changes what it 
   const slider = page.getByRole("slider", { name: "β", exact: true });
   await page.locator("#canvas").focus();
   for (let tabs = 0; tabs < 60 && (await slider.getAttribute("data-focus")) === null; tabs++) {
-    await page.keyboard.press("Tab");
-    await page.waitForTimeout(60);
+    await press(page, "Tab");
   }
   assert.equal(await slider.getAttribute("data-focus"), "true");
   assert.equal(await slider.getAttribute("aria-valuenow"), "0.6");
@@ -76,7 +75,7 @@ async function only(page, cloners) {
   for (const name of names) {
     if (!cloners.includes(name)) {
       await click(page, "checkbox", name);
-      await page.waitForTimeout(80);
+      await drawn(page);
     }
   }
 }
@@ -253,7 +252,7 @@ test("without WebGL 2, WebAssembly or workers the page says what is missing", as
   ]) {
     const { page, close } = await open(browser, site.address, { before: (page) => page.addInitScript(script) });
     await page.getByRole("alert").filter({ hasText: "does not offer " + name }).waitFor(PATIENCE);
-    await page.waitForTimeout(500);
+    await page.waitForLoadState("networkidle");
     assert.ok(await page.locator("#message").isVisible());
     await close();
   }

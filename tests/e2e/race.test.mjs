@@ -2,7 +2,7 @@
 import assert from "node:assert/strict";
 import { after, before, test } from "node:test";
 import { launch, open, serve } from "./browser.mjs";
-import { PATIENCE, SHOTS, click, trained } from "./visitor.mjs";
+import { PATIENCE, SHOTS, click, drawn, press, trained } from "./visitor.mjs";
 
 let browser, site;
 before(async () => {
@@ -31,7 +31,7 @@ test("a race runs from the cell that was clicked, and a thousand agree with the 
   await page.getByText(/^Bars: 1,000 episodes/).waitFor(PATIENCE);
   await page.getByText("100 % arrive (exact 100 %), 0 % are lost; 14.0 steps (exact 14.0)").waitFor(PATIENCE);
   await page.mouse.move(5, 5);
-  await page.waitForTimeout(500);
+  await drawn(page);
   await page.screenshot({ path: SHOTS + "race-1280x800-light.png" });
   // Another start by keyboard.
   await click(page, "button", /^Race board/, [0.65, 0.85]);
@@ -55,7 +55,7 @@ for (const [colorScheme, viewport] of [
     await page.mouse.move(viewport.width / 2, viewport.height / 2);
     await click(page, "button", "Race 1,000");
     await page.getByText(/^Bars: 1,000 episodes/).waitFor(PATIENCE);
-    await page.waitForTimeout(1500);
+    await drawn(page);
     const shot = `race-${viewport.width}x${viewport.height}-${colorScheme}`;
     await page.screenshot({ path: SHOTS + shot + ".png" });
     const beyond = await page.evaluate(() =>
@@ -64,7 +64,7 @@ for (const [colorScheme, viewport] of [
     assert.deepEqual(beyond, []);
     if (isPhone) {
       await page.mouse.wheel(0, 700);
-      await page.waitForTimeout(500);
+      await drawn(page);
       await page.screenshot({ path: SHOTS + shot + "-below.png" });
     }
     assert.deepEqual(problems, []);

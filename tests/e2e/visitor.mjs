@@ -27,10 +27,17 @@ export async function click(page, role, name, at = [0.5, 0.5]) {
   await page.mouse.click(box.x + box.width * at[0], box.y + box.height * at[1]);
 }
 
-/** Presses a key, and gives the page time to draw. */
+/** Waits until the page has drawn what it was told: egui takes up to three frames for an event. */
+export async function drawn(page) {
+  const frames = () => performance.getEntriesByName("ape-lab: frame").length;
+  const before = await page.evaluate(frames);
+  await page.waitForFunction((least) => performance.getEntriesByName("ape-lab: frame").length >= least, before + 4, PATIENCE);
+}
+
+/** Presses a key, and lets the page draw. */
 export async function press(page, key) {
   await page.keyboard.press(key);
-  await page.waitForTimeout(80);
+  await drawn(page);
 }
 
 /** Polls until what a promise gives satisfies a condition. */
