@@ -8,9 +8,11 @@
   const SHORT = 50;
   /** How long it rests at most: whatever is not heard of here shows after that. */
   const REST = 1000;
-  /** The frame that waits; then what the browser calls it. */
-  let waiting;
-  let called = 0;
+  /** The frames that wait, eframe's and those of others, by names of our own: the browser's are positive. */
+  const waiting = new Map();
+  /** What the browser calls those that have waited and are to come. */
+  const called = new Map();
+  let names = 0;
   let awakeUntil = 0;
   let timer;
   let alarm = Infinity;
@@ -28,23 +30,21 @@
   window.requestAnimationFrame = (callback) => {
     const now = performance.now();
     if (now < awakeUntil && now >= heldUntil) return request(measured(callback));
-    waiting = callback;
+    names -= 1;
+    waiting.set(names, callback);
     wakeIn(now < heldUntil ? heldUntil - now : REST);
-    return 0;
+    return names;
   };
 
-  // The browser calls no frame 0: that is the one that waits or has waited.
-  window.cancelAnimationFrame = (frame) => {
-    if (frame !== 0) return cancel(frame);
-    if (waiting) waiting = undefined;
-    else cancel(called);
-  };
+  window.cancelAnimationFrame = (frame) => waiting.delete(frame) || cancel(called.get(frame) ?? frame);
 
   function wake(stay) {
     awakeUntil = Math.max(awakeUntil, performance.now() + stay);
-    if (!waiting) return;
-    called = request(measured(waiting));
-    waiting = undefined;
+    for (const [name, callback] of waiting) {
+      const frame = measured(callback);
+      called.set(name, request((time) => called.delete(name) && frame(time)));
+    }
+    waiting.clear();
   }
 
   function wakeIn(delay) {

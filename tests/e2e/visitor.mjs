@@ -27,11 +27,11 @@ export async function click(page, role, name, at = [0.5, 0.5]) {
   await page.mouse.click(box.x + box.width * at[0], box.y + box.height * at[1]);
 }
 
-/** Waits until the page has drawn what it was told: egui takes up to three frames for an event. */
+/** Waits until the page has drawn what it was told: egui takes up to three frames for an event. Asks for none itself. */
 export async function drawn(page) {
   const frames = () => performance.getEntriesByName("ape-lab: frame").length;
   const before = await page.evaluate(frames);
-  await page.waitForFunction((least) => performance.getEntriesByName("ape-lab: frame").length >= least, before + 4, PATIENCE);
+  await until(() => page.evaluate(frames), (now) => now >= before + 4);
 }
 
 /** Presses a key, and lets the page draw. */
