@@ -47,6 +47,13 @@ fn a_trained_ensemble_evaluates_to_the_figures_it_was_printed_with() {
     assert_eq!((last[0], last[2].parse().ok()), ("19", trained["ensemble"]["capped_return"].as_f64()));
     let again: Value = serde_json::from_slice(&ape(&["train", "--config", files[1]]).stdout).unwrap();
     assert_eq!(again["digest"], trained["digest"]);
+    // So that it can be told which run a result is of, the digest goes with the files and with what is made of them.
+    let file: Value = serde_json::from_str(&std::fs::read_to_string(files[1]).unwrap()).unwrap();
+    let attack = ape(&["attack", files[1], "--attackers", "uniform", "--json"]);
+    let attack: Value = serde_json::from_slice(&attack.stdout).unwrap();
+    for digest in [&file["digest"], &attack["digest"], &json!(last.last().unwrap())] {
+        assert_eq!(*digest, trained["digest"]);
+    }
 }
 
 /// What else a file says does not change its ensemble; its T is the one that counts.
@@ -61,6 +68,7 @@ fn evaluate_takes_the_files_horizon_and_leaves_strange_fields_alone() {
     let mut strange: Value = serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap();
     strange["config"] = json!({"lambda": 1});
     strange["seed"] = json!(5);
+    strange["digest"] = json!("sha256:5");
     std::fs::write(path, strange.to_string()).unwrap();
     assert_eq!(evaluate()["horizon"], 100);
     let said = String::from_utf8(ape(&["evaluate", path]).stderr).unwrap();

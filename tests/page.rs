@@ -313,7 +313,7 @@ fn a_worker_that_makes_no_sense_is_replaced() {
     let before = figure(&page, "Ensemble capped");
     let mut snapshot = page.state().as_ref().unwrap().shown().unwrap().1.clone();
     snapshot.experts[0].hitting_time.pop();
-    let mut send = |page: &mut Page| {
+    let send = |page: &mut Page| {
         here.0.borrow_mut().events.push_back(Ok(Event::Snapshot(Box::new(snapshot.clone()))));
         page.run_steps(6);
         page.get_by(|node| says(node).is_some_and(|text| text.contains("99 hitting times: expected 100")));
@@ -532,6 +532,7 @@ fn what_is_shown_can_be_taken_away() {
     let last: Vec<&str> = curve.last().unwrap().split(',').collect();
     assert!(curve[0].starts_with("update,beta,ensemble_capped_return") && curve[0].split(',').count() == last.len());
     assert_eq!((last[0], &last[2][..6]), ("732", "-18.14"));
+    assert!(words(svg).contains(&format!(", digest {}.", last.last().unwrap())));
     let model: ape_lab::mdp::TransitionModel = serde_json::from_str(&saved[3].1).unwrap();
     assert_eq!((model.states, model.shape), (100, [10, 10]));
 
@@ -590,6 +591,21 @@ fn files_are_opened_or_refused_with_a_sentence() {
     settle(&mut page);
     page.run_steps(20);
     assert_eq!(figure(&page, "Ensemble capped"), -11.3);
+    page.get_by(|node| says(node).is_some_and(|text| text == "given ensemble, nothing to train"));
+
+    // A file that says which run it is from is shown, and saved, with that.
+    let digest = "0123456789abcdef".parse().ok();
+    let trap = serde_json::to_string(&EnsembleFile { digest, ..trap }).unwrap();
+    desktop.to_open.borrow_mut().push(("known.json".to_owned(), Ok(trap.clone())));
+    settle(&mut page);
+    page.run_steps(20);
+    page.get_by(|node| {
+        says(node).is_some_and(|text| text == "given ensemble, nothing to train, digest 0123456789abcdef")
+    });
+    go_to(&mut page, "Attack bench");
+    press(&mut page, "Save the ensemble");
+    page.run_steps(3);
+    assert_eq!(desktop.saved.borrow().last().unwrap().1, trap);
 }
 
 #[test]
@@ -603,6 +619,7 @@ fn the_sweep_and_table_1_are_made_on_the_page() {
     press(&mut page, "JSON");
     let sweep: Sweep = serde_json::from_str(&desktop.saved.borrow().last().unwrap().1).unwrap();
     assert_eq!((sweep.runs.len(), sweep.runs[0].beta, sweep.runs[11].beta), (12, 0.0, 0.3));
+    assert!(sweep.csv().lines().nth(1).unwrap().ends_with(&format!(",{}", sweep.runs[0].digest)));
     go_to(&mut page, "Table 1");
     only(&mut page, &["uniform", "occupancy"]);
     page.get_by_role_and_label(Role::SpinButton, "Seeds").set_value_accesskit(2.0);

@@ -27,9 +27,12 @@
   /** Asks a waiting version to take over, which ends in a reload; settles if it may not, as others use the old one. */
   function takeOver(waiting) {
     workers.addEventListener("controllerchange", reload);
+    // A busy Chromium may put it off for ever, until the old version has served one more worker.
+    const nudge = setTimeout(() => new Worker("./worker_loader.js", { type: "module" }).terminate(), 500);
     return new Promise((resolve) => {
       const { port1, port2 } = new MessageChannel();
       port1.onmessage = () => {
+        clearTimeout(nudge);
         workers.removeEventListener("controllerchange", reload);
         resolve();
       };

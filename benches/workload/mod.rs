@@ -85,7 +85,7 @@ pub fn steps_of_update(config: &Config) -> u64 {
 pub fn run(setup: &Setup) -> u64 {
     let mut trainer = trainer(setup);
     trainer.finish(&mut |_| true);
-    trainer.digest()
+    trainer.digest().0
 }
 
 /// Experts that have learned for a while: neither uniform nor settled.

@@ -7,7 +7,7 @@ use super::exact_ape::ExactApe;
 use super::observer::Memory;
 use super::pg_ape::PgApe;
 use super::softmax::softmax;
-use super::{AlgorithmKind, Config, ConfigError, Contexts, Ensemble};
+use super::{AlgorithmKind, Config, ConfigError, Contexts, Digest, Ensemble};
 use crate::mdp::{ACTIONS, Grid};
 
 /// What every algorithm holds: the experts, where and how they train.
@@ -147,13 +147,12 @@ impl Trainer {
         self.algorithm.bytes()
     }
 
-    /// A number that two runs share only when all their parameters agree to the last bit.
-    pub fn digest(&self) -> u64 {
+    pub fn digest(&self) -> Digest {
         let mut hash = fnv::FnvHasher::default();
         for parameter in self.algorithm.experts().logits.iter().chain(self.algorithm.values()) {
             hash.write(&parameter.to_bits().to_le_bytes());
         }
-        hash.finish()
+        Digest(hash.finish())
     }
 
     /// Makes the updates that are left of a run. `progress` hears what share is done and says whether to go on; the

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::Config;
+use super::{Config, Digest};
 use crate::mdp::{ACTIONS, Grid, GridError, GridSpec, Policy, PolicyError, Returns, Solver, Value};
 
 /// n experts; one of them, drawn uniformly, acts for a whole episode.
@@ -105,7 +105,7 @@ impl Contexts {
 }
 
 /// An ensemble as a file: `{"format":"ape-ensemble","version":1,"grid":…,"experts":[[[p;5];S];n]}`, with the
-/// configuration that made it where there is one. Other fields are ignored.
+/// configuration that made it, and the digest of the run at that moment, where there are such. Other fields are ignored.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct EnsembleFile {
     pub format: String,
@@ -116,6 +116,8 @@ pub struct EnsembleFile {
     // Written as null where there is none: messages (postcard) cannot leave a field out.
     #[serde(default)]
     pub config: Option<Config>,
+    #[serde(default)]
+    pub digest: Option<Digest>,
     /// Why the `config` that the file has was left out.
     #[serde(skip)]
     pub left_out: Option<String>,
@@ -162,6 +164,7 @@ impl EnsembleFile {
             grid: grid.spec().clone(),
             experts: ensemble.policies().iter().map(|policy| policy.rows().to_vec()).collect(),
             config,
+            digest: None,
             left_out: None,
         }
     }
@@ -170,15 +173,17 @@ impl EnsembleFile {
     pub const LONGEST: usize = 10_000_000;
 
     /// Reads the JSON text of a file; [`EnsembleFile::check`] then says whether it makes sense. A `config` that
-    /// is not ours is left out: it does not change what the ensemble is.
+    /// is not ours is left out: it does not change what the ensemble is. So is a digest that is none, without a word.
     pub fn parse(text: &str) -> Result<EnsembleFile, EnsembleError> {
         if text.len() > Self::LONGEST {
             return Err(EnsembleError::Long);
         }
         let json = |error: serde_json::Error| EnsembleError::Json(quoted(&error));
         let mut value: serde_json::Value = serde_json::from_str(text).map_err(json)?;
-        let config = value.as_object_mut().and_then(|fields| fields.remove("config"));
-        let file: EnsembleFile = serde_json::from_value(value).map_err(json)?;
+        let mut take = |name| value.as_object_mut().and_then(|fields| fields.remove(name));
+        let (config, digest) = (take("config"), take("digest"));
+        let digest = digest.and_then(|digest| serde_json::from_value(digest).ok());
+        let file = EnsembleFile { digest, ..serde_json::from_value(value).map_err(json)? };
         let config = match config {
             None | Some(serde_json::Value::Null) => return Ok(file),
             Some(config) => serde_json::from_value(config).map_err(|error| quoted(&error)),

@@ -4,7 +4,7 @@
 //! seed.
 
 use crate::ape::observer::ObserverChoice;
-use crate::ape::{AlgorithmKind, Config, ConfigError, Ensemble, Trainer};
+use crate::ape::{AlgorithmKind, Config, ConfigError, Digest, Ensemble, Trainer};
 use crate::attack::Progress;
 use crate::mdp::{ACTIONS, Grid, Policy, Solver, optimal_policy};
 
@@ -29,6 +29,9 @@ pub struct PaperRow {
     pub clone: (f64, f64),
 }
 
+/// An ensemble, and the digest of the run that it was trained in, if it was.
+pub type Made = (Ensemble, Option<Digest>);
+
 /// A way to come by an ensemble.
 pub struct Method {
     /// As in files.
@@ -37,7 +40,7 @@ pub struct Method {
     pub summary: &'static str,
     pub paper: Option<PaperRow>,
     /// None when it was told to stop.
-    pub make: fn(&Case, &mut Progress) -> Result<Option<Ensemble>, ConfigError>,
+    pub make: fn(&Case, &mut Progress) -> Result<Option<Made>, ConfigError>,
 }
 
 /// Every method; PG-APE first, as the baselines are measured by it.
@@ -87,7 +90,7 @@ pub static METHODS: [Method; 6] = [
     },
 ];
 
-fn train(case: &Case, algorithm: AlgorithmKind, progress: &mut Progress) -> Result<Option<Ensemble>, ConfigError> {
+fn train(case: &Case, algorithm: AlgorithmKind, progress: &mut Progress) -> Result<Option<Made>, ConfigError> {
     // What exact APE has no formula for is trained against its limit of many demonstrations.
     let observer = match algorithm {
         AlgorithmKind::Exact if case.config.observer != ObserverChoice::UNIFORM => ObserverChoice::OCCUPANCY,
@@ -95,7 +98,7 @@ fn train(case: &Case, algorithm: AlgorithmKind, progress: &mut Progress) -> Resu
     };
     let config = Config { algorithm, observer, ..case.config.clone() };
     let mut trainer = Trainer::new(case.grid.clone(), config)?;
-    Ok(trainer.finish(progress).then(|| trainer.ensemble()))
+    Ok(trainer.finish(progress).then(|| (trainer.ensemble(), Some(trainer.digest()))))
 }
 
 /// A run with β = 0, stopped where `figure` of the ensemble's and the clone's capped returns comes closest to what
@@ -105,7 +108,7 @@ fn stopped_early(
     figure: fn(f64, f64) -> f64,
     wanted: fn(&Measure) -> f64,
     progress: &mut Progress,
-) -> Result<Option<Ensemble>, ConfigError> {
+) -> Result<Option<Made>, ConfigError> {
     let wanted = wanted(&case.measure.expect("PG-APE comes first"));
     let config = Config {
         beta: 0.0,
@@ -117,7 +120,7 @@ fn stopped_early(
     let (updates, horizon) = (config.updates(), config.horizon);
     let mut trainer = Trainer::new(case.grid.clone(), config)?;
     let mut solver = Solver::new(case.grid);
-    let mut last: Option<(f64, Ensemble)> = None;
+    let mut last: Option<(f64, Made)> = None;
     for update in 0..=updates {
         let ensemble = trainer.ensemble();
         let returns = ensemble.returns(&mut solver, horizon);
@@ -126,10 +129,11 @@ fn stopped_early(
         let found = figure(own, clone);
         let off = (found - wanted).abs();
         if found >= wanted || update == updates {
+            let made = (ensemble, Some(trainer.digest()));
             let is_before_closer = last.as_ref().is_some_and(|(before, _)| *before < off);
-            return Ok(Some(if is_before_closer { last.expect("just looked at").1 } else { ensemble }));
+            return Ok(Some(if is_before_closer { last.expect("just looked at").1 } else { made }));
         }
-        last = Some((off, ensemble));
+        last = Some((off, (ensemble, Some(trainer.digest()))));
         trainer.update();
         if !progress(f64::from(update) / f64::from(updates)) {
             return Ok(None);
@@ -138,8 +142,8 @@ fn stopped_early(
     unreachable!("the last update returns")
 }
 
-fn all_alike(case: &Case, policy: Policy) -> Ensemble {
-    Ensemble::new(vec![policy; case.config.experts as usize])
+fn all_alike(case: &Case, policy: Policy) -> Made {
+    (Ensemble::new(vec![policy; case.config.experts as usize]), None)
 }
 
 /// (1 − ε) optimal + ε uniform, with the ε that brings its capped return to the measure.

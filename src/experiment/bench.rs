@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::Clock;
-use crate::ape::Ensemble;
+use crate::ape::{Digest, Ensemble};
 use crate::attack::{AttackerChoice, Cloned, Progress, Target};
 use crate::mdp::{Grid, KnownReturns, Returns, Solver};
 
@@ -58,6 +58,8 @@ pub struct Bench {
     /// T, in steps.
     pub horizon: u32,
     pub seed: u32,
+    /// Of the run that the ensemble is from, where its file says so.
+    pub digest: Option<Digest>,
     pub ensemble: Returns,
     pub attackers: Vec<Attack>,
 }
@@ -65,7 +67,7 @@ pub struct Bench {
 impl Bench {
     /// The bench as CSV, a line for each attacker.
     pub fn csv(&self) -> String {
-        let mut text = "attacker,capped_return,uncapped_return,horizon_return,horizon_error,success,success_error,drop,imitation_gap,pairs,seconds\n".to_owned();
+        let mut text = "attacker,capped_return,uncapped_return,horizon_return,horizon_error,success,success_error,drop,imitation_gap,pairs,seconds,digest\n".to_owned();
         let known = |value: Option<f64>| value.map_or(String::new(), |value| value.to_string());
         for attack in &self.attackers {
             let r = &attack.returns;
@@ -81,6 +83,7 @@ impl Bench {
                 attack.imitation_gap.to_string(),
                 attack.pairs.map_or(String::new(), |pairs| pairs.to_string()),
                 format!("{:.3}", attack.seconds),
+                self.digest.map_or(String::new(), |digest| digest.to_string()),
             ];
             text += &(fields.join(",") + "\n");
         }

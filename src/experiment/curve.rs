@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::ape::Trainer;
+use crate::ape::{Digest, Trainer};
 use crate::attack::own_clone;
 use crate::mdp::{ACTIONS, Grid, KnownReturns, Policy, RETURN_KINDS, Returns, Solver, occupancy};
 
@@ -16,6 +16,7 @@ pub struct CurvePoint {
     pub clone: KnownReturns,
     /// What is collected of r̃, where the clone is to be denied that.
     pub denied: Option<Denied>,
+    pub digest: Digest,
 }
 
 /// E[Σ r̃] within T, undiscounted, mean over the cells where episodes start.
@@ -48,6 +49,7 @@ impl CurvePoint {
             ensemble: Returns::mean(&ensemble.returns(&mut solver, config.horizon)),
             clone: own.returns,
             denied,
+            digest: trainer.digest(),
         }
     }
 
@@ -55,7 +57,7 @@ impl CurvePoint {
     pub fn csv_head() -> String {
         let columns = ["ensemble", "clone"].into_iter().flat_map(|of| RETURN_KINDS.iter().map(move |kind| (of, kind)));
         let columns: Vec<String> = columns.map(|(of, kind)| format!("{of}_{}", kind.name)).collect();
-        format!("update,beta,{},ensemble_denied,clone_denied", columns.join(","))
+        format!("update,beta,{},ensemble_denied,clone_denied,digest", columns.join(","))
     }
 
     /// The point as a line of that table.
@@ -64,7 +66,7 @@ impl CurvePoint {
         let values = values.iter().flat_map(|of: &KnownReturns| (0..RETURN_KINDS.len()).map(|kind| of.get(kind)));
         let values: Vec<String> = values.map(|value| value.map_or(String::new(), |v| v.to_string())).collect();
         let denied = self.denied.map_or(",".to_owned(), |denied| format!("{},{}", denied.ensemble, denied.clone));
-        format!("{},{},{},{denied}", self.update, self.beta, values.join(","))
+        format!("{},{},{},{denied},{}", self.update, self.beta, values.join(","), self.digest)
     }
 }
 

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use super::{Setup, SetupError, Sweep, SweepRun, sweep};
-use crate::ape::{Config, Trainer, quoted};
+use crate::ape::{Config, Digest, Trainer, quoted};
 use crate::mdp::{Grid, GridSpec, KnownReturns, RETURN_KINDS};
 
 /// Shard I of K, written `I/K`. Run r of a sweep, counted from 0, is in shard r mod K + 1, so that every shard has
@@ -144,7 +144,7 @@ pub struct SweepPlan {
     /// Number of seeds, from 1 on.
     pub seeds: u32,
     /// Hash of all parameters of the last run after three updates: programs that train alike share it.
-    pub digest: String,
+    pub digest: Digest,
 }
 
 impl SweepPlan {
@@ -152,7 +152,7 @@ impl SweepPlan {
     pub fn new(setup: &Setup, betas: Vec<f64>, seeds: u32) -> Result<SweepPlan, ShardError> {
         let (grid, config) = (setup.grid.clone(), setup.config.clone());
         let program = env!("CARGO_PKG_VERSION").to_owned();
-        let mut plan = SweepPlan { program, grid, config, betas, seeds, digest: String::new() };
+        let mut plan = SweepPlan { program, grid, config, betas, seeds, digest: Digest::default() };
         plan.check_lists()?;
         plan.config = plan.setup(0).config;
         plan.check()?;
@@ -161,7 +161,7 @@ impl SweepPlan {
         let grid = Grid::new(last.grid).map_err(|error| said(&error))?;
         let mut trainer = Trainer::new(grid, last.config).map_err(|error| said(&error))?;
         (0..3).for_each(|_| trainer.update());
-        plan.digest = format!("{:016x}", trainer.digest());
+        plan.digest = trainer.digest();
         Ok(plan)
     }
 
@@ -449,7 +449,7 @@ mod tests {
         let ensemble =
             Returns { capped_return: figure, uncapped_return: figure / 7.0, horizon_return: -0.0, success: 0.1 };
         let unknown = KnownReturns { capped_return: None, uncapped_return: None, ..ensemble.into() };
-        SweepRun { beta, seed, ensemble, clone: unknown, occupancy: ensemble.into() }
+        SweepRun { beta, seed, ensemble, clone: unknown, occupancy: ensemble.into(), digest: Digest(index as u64) }
     }
 
     fn shard(plan: &SweepPlan, shard: u32, shards: u32) -> Shard {
@@ -579,7 +579,10 @@ mod tests {
             (other(&|plan| plan.grid.walls.push((1, 1))), "sweep.grid.walls of 1 entries: expected 0"),
             (other(&|plan| plan.config.alpha = Some(-14.0)), "sweep.config.alpha -14.0: expected none"),
             (other(&|plan| plan.program = "0".to_owned()), "sweep.program \"0\": expected"),
-            (other(&|plan| plan.digest = "0".to_owned()), "\"0\" (by a program that trains otherwise): expected"),
+            (
+                other(&|plan| plan.digest = Digest(1)),
+                "\"0000000000000001\" (by a program that trains otherwise): expected",
+            ),
         ] {
             assert!(mixed.contains(expected), "{mixed}");
         }
@@ -617,7 +620,14 @@ mod tests {
         };
         let ensemble =
             Returns { capped_return: figure, uncapped_return: figure, horizon_return: figure, success: figure };
-        let run = SweepRun { beta: -figure, seed: 1000, ensemble, clone: returns, occupancy: returns };
+        let run = SweepRun {
+            beta: -figure,
+            seed: 1000,
+            ensemble,
+            clone: returns,
+            occupancy: returns,
+            digest: Digest(u64::MAX),
+        };
         let text = serde_json::to_string(&IndexedRun { index: 999_999, run }).unwrap();
         assert!(text.len() < 900, "{}", text.len());
     }

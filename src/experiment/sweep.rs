@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::baselines::PaperRow;
 use super::{Setup, Summary};
-use crate::ape::{Config, Trainer};
+use crate::ape::{Config, Digest, Trainer};
 use crate::attack::{AttackerChoice, Progress, Target};
 use crate::experiment::bench::ensemble_returns;
 use crate::mdp::{Grid, KnownReturns, RETURN_KINDS, Returns};
@@ -19,6 +19,7 @@ pub struct SweepRun {
     pub clone: KnownReturns,
     /// Of the clone that clones the demonstrations.
     pub occupancy: KnownReturns,
+    pub digest: Digest,
 }
 
 impl SweepRun {
@@ -44,6 +45,7 @@ impl SweepRun {
             ensemble: ensemble_returns(&grid, &ensemble, config.horizon),
             clone: own,
             occupancy,
+            digest: trainer.digest(),
         }))
     }
 }
@@ -142,13 +144,14 @@ impl Sweep {
     pub fn csv(&self) -> String {
         let columns = ["ensemble", "clone", "occupancy"];
         let names = columns.iter().flat_map(|of| RETURN_KINDS.iter().map(move |kind| format!("{of}_{}", kind.name)));
-        let mut text = format!("beta,seed,{}\n", names.collect::<Vec<_>>().join(","));
+        let mut text = format!("beta,seed,{},digest\n", names.collect::<Vec<_>>().join(","));
         for run in &self.runs {
             let values = [KnownReturns::from(run.ensemble), run.clone, run.occupancy];
             let values = values.iter().flat_map(|returns| {
                 (0..RETURN_KINDS.len()).map(|kind| returns.get(kind).map_or(String::new(), |value| value.to_string()))
             });
-            text += &format!("{},{},{}\n", run.beta, run.seed, values.collect::<Vec<_>>().join(","));
+            let values: Vec<String> = values.collect();
+            text += &format!("{},{},{},{}\n", run.beta, run.seed, values.join(","), run.digest);
         }
         text
     }

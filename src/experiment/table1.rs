@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::baselines::{Case, METHODS, Measure};
 use super::bench::ensemble_returns;
 use super::{Setup, Summary};
-use crate::ape::Config;
+use crate::ape::{Config, Digest};
 use crate::attack::{AttackerChoice, Progress, Target};
 use crate::mdp::{Grid, KnownReturns, RETURN_KINDS, Returns};
 
@@ -15,6 +15,8 @@ pub struct MethodRun {
     /// Its name in [`METHODS`].
     pub method: String,
     pub seed: u32,
+    /// Of the run that the ensemble was trained in, for the methods that train.
+    pub digest: Option<Digest>,
     pub ensemble: Returns,
     /// In the order of the attackers asked for.
     pub clones: Vec<KnownReturns>,
@@ -36,7 +38,7 @@ pub fn run_seed(
     for (index, method) in METHODS.iter().enumerate() {
         let mut step = |part: f64| progress((done + part) / parts);
         let case = Case { grid: &grid, config, measure };
-        let Some(ensemble) = (method.make)(&case, &mut step).map_err(|error| error.to_string())? else {
+        let Some((ensemble, digest)) = (method.make)(&case, &mut step).map_err(|error| error.to_string())? else {
             return Ok(None);
         };
         done += 1.0;
@@ -54,7 +56,7 @@ pub fn run_seed(
             clones.push(clone.returns);
             done += 1.0;
         }
-        runs.push(MethodRun { method: method.name.to_owned(), seed: config.seed, ensemble: returns, clones });
+        runs.push(MethodRun { method: method.name.to_owned(), seed: config.seed, digest, ensemble: returns, clones });
     }
     Ok(Some(runs))
 }
@@ -105,7 +107,7 @@ impl Table1 {
     /// Every run and cloner as a line of CSV.
     pub fn csv(&self) -> String {
         let names: Vec<&str> = RETURN_KINDS.iter().map(|kind| kind.name).collect();
-        let mut text = format!("method,seed,policy,{},horizon_error,success_error\n", names.join(","));
+        let mut text = format!("method,seed,policy,{},horizon_error,success_error,digest\n", names.join(","));
         for run in &self.runs {
             let ensemble = KnownReturns::from(run.ensemble);
             let clones = self.attackers.iter().map(ToString::to_string).zip(&run.clones);
@@ -114,12 +116,13 @@ impl Table1 {
                     (0..RETURN_KINDS.len()).map(|kind| returns.get(kind).map_or(String::new(), |v| v.to_string()));
                 let values: Vec<String> = values.collect();
                 text += &format!(
-                    "{},{},{policy},{},{},{}\n",
+                    "{},{},{policy},{},{},{},{}\n",
                     run.method,
                     run.seed,
                     values.join(","),
                     returns.horizon_error,
-                    returns.success_error
+                    returns.success_error,
+                    run.digest.map_or(String::new(), |digest| digest.to_string())
                 );
             }
         }

@@ -4,14 +4,14 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::ape::EnsembleFile;
+use crate::ape::{Digest, EnsembleFile};
 use crate::attack::{AttackerChoice, Cloned};
 use crate::experiment::{Course, CurvePoint, Outcome, Setup};
 use crate::mdp::{KnownReturns, Policy, Returns};
 
 /// Version of the messages: an old cached worker must not be taken for a new one. [`Event::Ready`] stays the
 /// first variant, so that every version can read every other's.
-pub const PROTOCOL: u32 = 5;
+pub const PROTOCOL: u32 = 6;
 
 /// Longest message, in bytes: the largest ensemble there can be, with its clones and its curve, takes a tenth of it.
 pub const LONGEST: usize = 16_000_000;
@@ -136,8 +136,8 @@ pub struct Snapshot {
     pub course: Course,
     /// β of the updates to come.
     pub beta: f64,
-    /// Hash of all parameters: equal runs share it, on every machine.
-    pub digest: u64,
+    /// Of a given ensemble what its file says.
+    pub digest: Option<Digest>,
     /// Time spent on updates while playing this run, in milliseconds.
     pub training_ms: f64,
     pub experts: Vec<PolicyView>,

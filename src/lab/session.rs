@@ -7,7 +7,7 @@ use std::ops::RangeInclusive;
 
 use super::recording::{Recording, advance};
 use super::{CloneView, Command, Event, Exported, PolicyView, RunState, Snapshot, Started};
-use crate::ape::{Config, Ensemble, EnsembleFile, Trainer};
+use crate::ape::{Config, Digest, Ensemble, EnsembleFile, Trainer};
 use crate::attack::{AttackerChoice, Cloned, Target, own_clone};
 use crate::experiment::{Course, CurvePoint, Setup};
 use crate::mdp::{Grid, Policy, Returns, Solver, optimal_policy};
@@ -503,11 +503,19 @@ impl Run {
     }
 
     fn export(&self, run: u32) -> Exported {
-        let (update, config) = match &self.subject {
-            Subject::Training(trainer) => (trainer.updates(), Some(self.setup.config.clone())),
-            Subject::Given { .. } => (0, self.setup.ensemble.as_ref().and_then(|file| file.config.clone())),
+        let (update, config, digest) = match &self.subject {
+            Subject::Training(trainer) => (trainer.updates(), Some(self.setup.config.clone()), Some(trainer.digest())),
+            Subject::Given { .. } => {
+                (0, self.setup.ensemble.as_ref().and_then(|file| file.config.clone()), self.given_digest())
+            }
         };
-        Exported { run, update, file: EnsembleFile::new(self.subject.grid(), &self.ensemble(), config) }
+        let file = EnsembleFile::new(self.subject.grid(), &self.ensemble(), config);
+        Exported { run, update, file: EnsembleFile { digest, ..file } }
+    }
+
+    /// The digest that the file of a given ensemble has.
+    fn given_digest(&self) -> Option<Digest> {
+        self.setup.ensemble.as_ref().and_then(|file| file.digest)
     }
 
     fn add_curve_point(&mut self) {
@@ -541,8 +549,8 @@ impl Run {
             clones.extend(cloned.map(|cloned| CloneView::new(cloner, &cloned)));
         }
         let (update, beta, digest) = match &self.subject {
-            Subject::Training(trainer) => (trainer.updates(), trainer.config().beta, trainer.digest()),
-            Subject::Given { .. } => (0, self.setup.config.beta, 0),
+            Subject::Training(trainer) => (trainer.updates(), trainer.config().beta, Some(trainer.digest())),
+            Subject::Given { .. } => (0, self.setup.config.beta, self.given_digest()),
         };
         let state = match &self.subject {
             Subject::Given { .. } => RunState::Given,

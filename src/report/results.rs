@@ -435,7 +435,10 @@ fn bench(
         .collect();
     let (grid, ensemble) = file.clone().check().map_err(|error| error.to_string())?;
     let ensemble = ensemble_returns(&grid, &ensemble, HORIZON);
-    Ok((crate::experiment::Bench { horizon: HORIZON, seed, ensemble, attackers: attacks.clone() }, attacks))
+    Ok((
+        crate::experiment::Bench { horizon: HORIZON, seed, digest: file.digest, ensemble, attackers: attacks.clone() },
+        attacks,
+    ))
 }
 
 fn learning_curve(document: &mut Document, run: Run) -> Result<String, String> {

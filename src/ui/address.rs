@@ -57,7 +57,9 @@ impl App {
             if snapshot.update != snapshot.last_update {
                 put("at", snapshot.update.to_string());
             }
-            put("digest", super::numbers::digest(snapshot.digest));
+            if let Some(digest) = snapshot.digest {
+                put("digest", digest.to_string());
+            }
         }
         encode(&pairs)
     }
@@ -225,9 +227,9 @@ fn read_promise(pairs: &mut Pairs, setup: &Setup) -> Result<Promise, AddressErro
         }
     }
     if let Some(value) = take(pairs, "digest") {
-        match u64::from_str_radix(&value, 16) {
-            Ok(digest) if value.len() == 16 => promise.digest = Some(digest),
-            _ => return bad("digest", &value, "16 hexadecimal digits"),
+        match value.parse() {
+            Ok(digest) => promise.digest = Some(digest),
+            Err(_) => return bad("digest", &value, "16 hexadecimal digits"),
         }
     }
     Ok(promise)

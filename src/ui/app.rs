@@ -14,7 +14,7 @@ use super::slow_clones::SlowClones;
 use super::world::WorldTab;
 use super::{theme, toolbar};
 use crate::ape::observer::ObserverChoice;
-use crate::ape::{Config, EnsembleFile};
+use crate::ape::{Config, Digest, EnsembleFile};
 use crate::attack::AttackerChoice;
 use crate::experiment::{Course, CurvePoint, Denied, PRESETS, Setup};
 use crate::lab::{Command, Event, Exported, Link, PROTOCOL, Pool, RunState, Snapshot, Started};
@@ -165,7 +165,7 @@ pub struct App {
 pub struct Promise {
     /// The moment to show; none is the end.
     pub update: Option<u32>,
-    pub digest: Option<u64>,
+    pub digest: Option<Digest>,
 }
 
 /// Whether a run has come to the digest of the address.
@@ -173,7 +173,7 @@ pub struct Promise {
 pub struct Reproduced {
     pub run: u32,
     pub update: u32,
-    pub promised: u64,
+    pub promised: Digest,
 }
 
 impl App {
@@ -425,7 +425,7 @@ impl App {
     }
 
     /// The digest that the link which was opened has for the moment shown.
-    pub fn promised(&self) -> Option<u64> {
+    pub fn promised(&self) -> Option<Digest> {
         let (_, snapshot) = self.shown()?;
         let reproduced =
             self.reproduced.filter(|reproduced| (reproduced.run, reproduced.update) == (snapshot.run, snapshot.update));

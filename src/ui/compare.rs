@@ -48,7 +48,7 @@ impl App {
         let snapshot = &shown.snapshot;
         let mut setup = shown.started.setup.clone();
         setup.course = snapshot.course.clone();
-        let promise = super::app::Promise { update: Some(snapshot.update), digest: Some(snapshot.digest) };
+        let promise = super::app::Promise { update: Some(snapshot.update), digest: snapshot.digest };
         let is_trained = setup.ensemble.is_none();
         let text = setup.ensemble.as_ref().and_then(|ensemble| serde_json::to_string(ensemble).ok());
         let preset = PRESETS.iter().position(|preset| (preset.setup)() == setup);
@@ -157,7 +157,7 @@ impl Line {
                 clone.map_or_else(dash, |clone| numbers::of_kind(kind, clone)),
                 ratio.unwrap_or_else(dash),
                 snapshot.update.to_string(),
-                numbers::digest(snapshot.digest),
+                snapshot.digest.map_or_else(dash, |digest| digest.to_string()),
             ],
         }
     }

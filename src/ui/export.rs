@@ -193,9 +193,6 @@ fn legend(shown: &Shown) -> String {
 }
 
 fn source(shown: &Shown) -> String {
-    let digest = match shown.snapshot.state {
-        RunState::Given => String::new(),
-        _ => format!(", digest {:016x}", shown.snapshot.digest),
-    };
+    let digest = shown.snapshot.digest.map_or(String::new(), |digest| format!(", digest {digest}"));
     format!("ape-lab {}{digest}.", env!("CARGO_PKG_VERSION"))
 }

@@ -213,7 +213,7 @@ fn progress(app: &App) -> String {
     match snapshot.state {
         _ if !app.is_session_alive() => format!("stopped at {of}"),
         _ if app.is_retraining() => "retraining …".to_owned(),
-        RunState::Given => "given ensemble, nothing to train".to_owned(),
+        RunState::Given => format!("given ensemble, nothing to train{}", digest(app, snapshot)),
         RunState::Playing => format!("training, {of}"),
         RunState::Paused => format!("paused at {of}{}", digest(app, snapshot)),
         RunState::Finished => {
@@ -224,11 +224,11 @@ fn progress(app: &App) -> String {
 
 /// The digest of the moment shown, and whether it is that of the link which was opened.
 fn digest(app: &App, snapshot: &Snapshot) -> String {
-    let text = format!(", digest {}", numbers::digest(snapshot.digest));
+    let text = snapshot.digest.map_or(String::new(), |digest| format!(", digest {digest}"));
     match app.promised() {
         None => text,
-        Some(promised) if promised == snapshot.digest => text + ", the same as in the link",
-        Some(promised) => format!("{text}, but the link was made with {}", numbers::digest(promised)),
+        Some(promised) if snapshot.digest == Some(promised) => text + ", the same as in the link",
+        Some(promised) => format!("{text}, but the link was made with {promised}"),
     }
 }
 

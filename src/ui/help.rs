@@ -48,6 +48,8 @@ pub fn show(ui: &mut Ui) -> bool {
             RichText::new("Policies that reach the goal and cannot be cloned. Or can they?")
                 .color(Palette::of(ui).muted),
         );
+        let version = concat!("Version ", env!("CARGO_PKG_VERSION"));
+        ui.label(RichText::new(version).small().color(Palette::of(ui).muted));
         egui::ScrollArea::vertical().max_height(ui.ctx().content_rect().height() - 200.0).show(ui, |ui| {
             for (title, text) in PARAGRAPHS {
                 ui.add_space(6.0);

@@ -55,11 +55,6 @@ pub fn short_beta(beta: f64) -> String {
     format!("{}", libm::round(beta * 1e4) / 1e4)
 }
 
-/// A digest: sixteen hexadecimal digits.
-pub fn digest(digest: u64) -> String {
-    format!("{digest:016x}")
-}
-
 /// A probability to a tenth of a per cent; the same at the ends.
 pub fn fine_percent(p: f64) -> String {
     match p {

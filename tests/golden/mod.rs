@@ -4,7 +4,7 @@
 
 use std::hash::Hasher;
 
-use ape_lab::ape::{AlgorithmKind, BaselineKind, Config, GradientKind, ReturnToGo, Trainer};
+use ape_lab::ape::{AlgorithmKind, BaselineKind, Config, Digest, GradientKind, ReturnToGo, Trainer};
 use ape_lab::attack::{AttackerChoice, Target};
 use ape_lab::experiment::{PRESETS, Preset};
 use ape_lab::mdp::{Grid, GridSpec};
@@ -23,7 +23,7 @@ pub fn check_presets() {
         assert_eq!(config.updates(), 40);
         let mut trainer = Trainer::new(Grid::new(setup.grid).unwrap(), config).unwrap();
         (0..40).for_each(|_| trainer.update());
-        found.push(format!("{name},{seed},{:016x}", trainer.digest()));
+        found.push(format!("{name},{seed},{}", trainer.digest()));
         assert_eq!(found.last().unwrap(), &format!("{name},{seed},{expected}"));
     }
     let trains = |preset: &&Preset| (preset.setup)().ensemble.is_none();
@@ -72,7 +72,7 @@ pub fn check() {
         for _ in 0..50 {
             trainer.update();
         }
-        let digest: u64 = trainer.digest();
+        let Digest(digest) = trainer.digest();
         assert_eq!(digest, expected, "{name}: {digest:#018x}");
     }
 }

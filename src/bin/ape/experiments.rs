@@ -13,7 +13,7 @@ use ape_lab::mdp::RETURN_KINDS;
 use clap::{Arg, ArgAction, ArgMatches, Command};
 use rayon::prelude::*;
 
-use super::{check_out, ensemble_file, print, setup, shards, with_setup, write};
+use super::{Opened, check_out, ensemble_file, print, setup, shards, with_setup, write};
 
 /// Every command of this file.
 pub fn commands() -> [Command; 5] {
@@ -137,7 +137,7 @@ fn attackers(matches: &ArgMatches) -> Result<Vec<AttackerChoice>, String> {
 
 pub fn attack(matches: &ArgMatches) -> Result<(), String> {
     check_out(matches, "out")?;
-    let (grid, ensemble, horizon) = ensemble_file(matches)?;
+    let Opened { grid, ensemble, horizon, digest } = ensemble_file(matches)?;
     let seed = number(matches, "seed", 0, u32::MAX)?;
     let file = Box::new(EnsembleFile::new(&grid, &ensemble, None));
     let task = |attacker| Task::Attack { ensemble: file.clone(), attacker, horizon, seed };
@@ -147,7 +147,7 @@ pub fn attack(matches: &ArgMatches) -> Result<(), String> {
         _ => None,
     });
     let ensemble = ensemble_returns(&grid, &ensemble, horizon);
-    let bench = Bench { horizon, seed, ensemble, attackers: attackers.collect() };
+    let bench = Bench { horizon, seed, digest, ensemble, attackers: attackers.collect() };
     if let Some(file) = matches.get_one::<String>("out") {
         write(file, &bench.csv())?;
     }

@@ -16,7 +16,7 @@ use std::io::{Read, Write};
 use std::path::Path;
 use std::process::ExitCode;
 
-use ape_lab::ape::{Ensemble, EnsembleFile, FIELDS, Field, Figures, Trainer};
+use ape_lab::ape::{Digest, Ensemble, EnsembleFile, FIELDS, Field, Figures, Trainer};
 use ape_lab::experiment::{CurvePoint, Denied, PRESETS, Preset, Setup};
 use ape_lab::mdp::{Grid, HORIZON, KnownReturns, transition_model};
 use clap::{Arg, ArgMatches, Command};
@@ -162,8 +162,17 @@ fn print(result: &impl Serialize) -> Result<(), String> {
     Ok(())
 }
 
-/// The grid and the ensemble of the file that is named, and the T it was trained with.
-fn ensemble_file(matches: &ArgMatches) -> Result<(Grid, Ensemble, u32), String> {
+/// An ensemble's file, checked.
+struct Opened {
+    grid: Grid,
+    ensemble: Ensemble,
+    /// T that it was trained with, in steps.
+    horizon: u32,
+    digest: Option<Digest>,
+}
+
+/// The file that is named.
+fn ensemble_file(matches: &ArgMatches) -> Result<Opened, String> {
     let file = matches.get_one::<String>("file").expect("clap requires it");
     let in_file = |error| format!("{file}: {error}");
     let parsed =
@@ -172,12 +181,13 @@ fn ensemble_file(matches: &ArgMatches) -> Result<(Grid, Ensemble, u32), String> 
     if let Some(reason) = &parsed.left_out {
         eprintln!("ape: {file}: its config is not ours and left out, T is {HORIZON} ({reason})");
     }
+    let digest = parsed.digest;
     let (grid, ensemble) = parsed.check().map_err(|error| in_file(error.to_string()))?;
-    Ok((grid, ensemble, horizon))
+    Ok(Opened { grid, ensemble, horizon, digest })
 }
 
 fn evaluate(matches: &ArgMatches) -> Result<(), String> {
-    let (grid, ensemble, horizon) = ensemble_file(matches)?;
+    let Opened { grid, ensemble, horizon, .. } = ensemble_file(matches)?;
     print(&Figures::of(&grid, &ensemble, horizon))
 }
 
@@ -241,8 +251,7 @@ fn flag_sentence(field: &Field, sentence: &str) -> String {
 #[derive(Serialize)]
 struct Trained {
     updates: u32,
-    /// Hash of all parameters: equal runs share it, on every machine.
-    digest: String,
+    digest: Digest,
     observer: String,
     /// β at the end, which `alpha` may have moved.
     beta: f64,
@@ -272,7 +281,8 @@ fn train(matches: &ArgMatches) -> Result<(), String> {
     }
     let ensemble = trainer.ensemble();
     if let Some(file) = matches.get_one::<String>("out") {
-        let text = serde_json::to_string(&EnsembleFile::new(&grid, &ensemble, Some(config.clone())));
+        let made = EnsembleFile::new(&grid, &ensemble, Some(config.clone()));
+        let text = serde_json::to_string(&EnsembleFile { digest: Some(trainer.digest()), ..made });
         write(file, &(text.map_err(|error| error.to_string())? + "\n"))?;
     }
     if let Some(file) = curve_file {
@@ -281,7 +291,7 @@ fn train(matches: &ArgMatches) -> Result<(), String> {
     let point = CurvePoint::of(&mut trainer);
     print(&Trained {
         updates: trainer.updates(),
-        digest: format!("{:016x}", trainer.digest()),
+        digest: trainer.digest(),
         observer: config.observer.to_string(),
         beta: point.beta,
         clone: point.clone,

@@ -3,7 +3,7 @@
 use egui::{RichText, Ui, vec2};
 
 use super::{Batch, choose_cloners, exports, introduce, title_of};
-use crate::ape::EnsembleFile;
+use crate::ape::{Digest, EnsembleFile};
 use crate::attack::AttackerChoice;
 use crate::experiment::{Attack, Bench, Outcome, Task, ensemble_returns};
 use crate::lab::Exported;
@@ -28,6 +28,7 @@ struct Subject {
     title: String,
     horizon: u32,
     seed: u32,
+    digest: Option<Digest>,
     ensemble: Returns,
 }
 
@@ -47,7 +48,8 @@ impl BenchTab {
         let config = &app.setup().config;
         let (horizon, seed) = (config.horizon, config.seed);
         let title = title_of(&exported, app);
-        self.subject = Some(Subject { title, horizon, seed, ensemble: ensemble_returns(&grid, &ensemble, horizon) });
+        let (digest, ensemble) = (exported.file.digest, ensemble_returns(&grid, &ensemble, horizon));
+        self.subject = Some(Subject { title, horizon, seed, digest, ensemble });
         // What it came from does not matter to whoever attacks it.
         let file = Box::new(EnsembleFile { config: None, ..exported.file });
         let mut cloners = self.cloners.clone();
@@ -123,8 +125,8 @@ impl BenchTab {
             Outcome::Attack(attack, _) => Some(attack.clone()),
             _ => None,
         });
-        let Subject { horizon, seed, ensemble, .. } = *subject;
-        Some(Bench { horizon, seed, ensemble, attackers: attackers.collect() })
+        let Subject { horizon, seed, digest, ensemble, .. } = *subject;
+        Some(Bench { horizon, seed, digest, ensemble, attackers: attackers.collect() })
     }
 }
 
