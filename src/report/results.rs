@@ -375,7 +375,8 @@ fn benches(document: &mut Document, run: Run) -> Result<String, String> {
             .to_owned();
     let trained = |config: Config| -> Result<EnsembleFile, String> {
         let trainer = train(config)?;
-        Ok(EnsembleFile::new(trainer.grid(), &trainer.ensemble(), None))
+        let file = EnsembleFile::new(trainer.grid(), &trainer.ensemble(), None);
+        Ok(EnsembleFile { digest: Some(trainer.digest()), ..file })
     };
     let trap = PRESETS.iter().find(|preset| preset.name == "trap").and_then(|preset| (preset.setup)().ensemble);
     let subjects = [

@@ -263,6 +263,7 @@ async function memory(browser, site) {
   await page.locator("#canvas").focus();
   const debug = await page.context().newCDPSession(page);
   const [begin, pages, workers] = [Date.now(), [], []];
+  let frames = 0;
   const look = async () => {
     const at = (Date.now() - begin) / 60_000;
     await debug.send("HeapProfiler.collectGarbage");
@@ -270,6 +271,7 @@ async function memory(browser, site) {
     const program = await page.evaluate(() => window.bench.memory.buffer.byteLength);
     pages.push([at, (usedSize + program) / 1e6]);
     workers.push([at, (await page.workers()[0].evaluate(() => self.benchMemory.buffer.byteLength)) / 1e6]);
+    frames += await page.evaluate(() => performance.getEntriesByName("ape-lab: frame").length);
     await forget(page);
     await page.evaluate(() => (window.bench.bytes = []));
   };
@@ -284,7 +286,7 @@ async function memory(browser, site) {
   }
   const half = (points) => points.slice(points.length >> 1);
   const grows = (points) => `in the second half it grew by ${slope(half(points)).toFixed(3)} MB a minute`;
-  const how = `${MINUTES} min of play (β, play, timeline, tabs)`;
+  const how = `${MINUTES} min of play (β, play, timeline, tabs; ${frames} frames)`;
   row("memory of the worker's program", "MB", 64, "max", workers.map((p) => p[1]), `WebAssembly memory during ${how}; ${grows(workers)}.`);
   row("memory of the page", "MB", 150, "max", pages.map((p) => p[1]), `WebAssembly memory and JavaScript's heap in use after a collection, during ${how}; ${grows(pages)}.`);
   await close();
