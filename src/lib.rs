@@ -7,6 +7,7 @@
 //! - [`attack`]: the cloners, from behaviour cloning to a recurrent network, and what their clones return.
 //! - [`experiment`]: what a run starts from, the presets, and the course of a run.
 //! - [`lab`]: a training session as a state machine with messages in and out, and a thread to run it.
+//! - `files`: files written whole or not at all, natively.
 //! - `picture`: heat maps and charts as SVG, and the maps from steps to colours.
 //! - `report`: the results of all experiments as a document.
 //! - `ui`: the page, in egui and nothing else.
@@ -18,6 +19,8 @@
 pub mod ape;
 pub mod attack;
 pub mod experiment;
+#[cfg(all(not(target_arch = "wasm32"), any(feature = "page", feature = "cli")))]
+pub mod files;
 pub mod lab;
 pub mod mdp;
 #[cfg(any(feature = "page", feature = "cli"))]

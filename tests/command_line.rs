@@ -66,13 +66,21 @@ fn evaluate_takes_the_files_horizon_and_leaves_strange_fields_alone() {
     let evaluate = || serde_json::from_slice::<Value>(&ape(&["evaluate", path]).stdout).unwrap();
     assert_eq!((evaluate()["horizon"].as_u64(), &evaluate()["ensemble"]), (Some(30), &trained["ensemble"]));
     let mut strange: Value = serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap();
+    // A configuration of ours that is for another grid is no better.
+    strange["config"] = json!({"adversary_reward": "20,20=1"});
+    std::fs::write(path, strange.to_string()).unwrap();
+    let said = String::from_utf8(ape(&["evaluate", path]).stderr).unwrap();
+    assert!(said.contains("left out, T is 100 (adversary_reward 20,20: must be a cell"), "{said}");
     strange["config"] = json!({"lambda": 1});
     strange["seed"] = json!(5);
     strange["digest"] = json!("sha256:5");
     std::fs::write(path, strange.to_string()).unwrap();
     assert_eq!(evaluate()["horizon"], 100);
     let said = String::from_utf8(ape(&["evaluate", path]).stderr).unwrap();
-    assert!(said.contains("its config is not ours and left out, T is 100 (unknown field `lambda`"), "{said}");
+    assert!(
+        said.contains("its config is not ours and left out, T is 100 (config.lambda: unknown field `lambda`"),
+        "{said}"
+    );
 }
 
 #[test]
@@ -139,6 +147,12 @@ fn bad_flags_get_one_sentence() {
     assert!(complaint(&["table1", "--preset", "price"]).contains("alpha -14: must be none where runs are compared"));
     assert!(complaint(&["sweep", "--out", "/no/such/folder/x.csv"]).contains("there is no folder /no/such/folder"));
     assert!(complaint(&["table1", "--seeds", "0"]).contains("--seeds 0: must be a whole number from 1 to 1000"));
+    for (flag, value) in [("--seeds", "-1"), ("--betas", "-1:1:0.5")] {
+        assert!(complaint(&["sweep", flag, value]).contains(&format!("{flag} {value}: must be")));
+    }
+    assert!(complaint(&["sweep", "--betas", "0.6,0.6"]).contains("--betas 0.6,0.6: β 0.6 stands there twice"));
+    // A sentence has a length that is read.
+    assert!(complaint(&["train", "--preset", &"long".repeat(9000)]).chars().count() < 2100);
     assert!(complaint(&["sweep", "--betas", "0:3:1"]).contains("--betas 0:3:1: must be FIRST:LAST:STEP"));
     assert!(complaint(&["attack", "/no/such/file"]).contains("/no/such/file"));
     assert!(complaint(&["evaluate", "/no/such/file"]).contains("/no/such/file"));
@@ -156,7 +170,7 @@ fn bad_files_get_one_sentence_and_leave_nothing_behind() {
         (json!({"experts": [[[0.2, 0.2, 0.2, 0.2, 0.2]]]}), "expert 1: the policy has 1 rows"),
         (json!({"experts": [vec![[0.5; 5]; 4]]}), "sum to 2.5"),
         (json!({"experts": [[[0.2]]]}), "not an ensemble file"),
-        (json!({"experts": [[[null, 0.2, 0.2, 0.2, 0.2]]]}), "not an ensemble file"),
+        (json!({"experts": [[[null, 0.2, 0.2, 0.2, 0.2]]]}), "experts[0][0][0]: invalid type: null, expected f64"),
         (json!({"experts": [vec![[-0.2, 0.6, 0.2, 0.2, 0.2]; 4]]}), "probability -0.2 of action 0"),
         (json!({"version": 99}), "version 99: this program reads version 1"),
         (json!({"grid": {"rows": 2, "cols": 2, "goal": [5, 0]}}), "lies outside"),
@@ -178,24 +192,103 @@ fn bad_files_get_one_sentence_and_leave_nothing_behind() {
         (whole.as_bytes()[..whole.len() / 2].to_vec(), "not an ensemble file: EOF"),
         (whole.replace("0.2", "NaN").into_bytes(), "not an ensemble file: expected value"),
         (whole.replace("0.2", "1e999").into_bytes(), "not an ensemble file: number out of range"),
-        (vec![0xff, 0xfe, 0x00], "valid UTF-8"),
+        (vec![0xff, 0xfe, 0x00], "a text in UTF-8"),
         (Vec::new(), "not an ensemble file: EOF"),
+        (whole.replace("\"version\":1", "\"version\":1,\"version\":1").into_bytes(), "\"version\" stands there twice"),
     ] {
         std::fs::write(&path, bytes).unwrap();
         let line = complaint(&["attack", path.to_str().unwrap()]);
         assert!(line.contains("bad.json") && line.contains(expected), "{line}");
     }
+    // What a file says does nothing to a terminal.
+    std::fs::write(&path, r#"{"\u001b[31mred\u0007\r": 1}"#).unwrap();
+    let line = complaint(&["train", "--config", path.to_str().unwrap()]);
+    assert!(line.contains(r"unknown field `\u{1b}[31mred\u{7}\r`"), "{line}");
+    // Nor does the mark that some editors begin a file with.
+    std::fs::write(&path, "\u{feff}{\"beta\": 5}").unwrap();
+    assert!(complaint(&["train", "--config", path.to_str().unwrap()]).contains("beta 5: must be a number"));
     std::fs::File::create(&path).unwrap().set_len(100_000_000).unwrap();
     let line = complaint(&["evaluate", path.to_str().unwrap()]);
     assert!(line.contains("100000000 bytes: expected at most 10 MB"), "{line}");
     let nowhere = file("no-such-folder").join("out.json");
     let line = complaint(&["train", "--total-steps", "1", "--out", nowhere.to_str().unwrap()]);
     assert!(line.contains("no-such-folder"), "{line}");
-    // A folder cannot be replaced by a file: the part written before is taken away again.
     let folder = file("folder.json");
     std::fs::create_dir_all(folder.join("kept")).unwrap();
-    complaint(&["train", "--total-steps", "1", "--out", folder.to_str().unwrap()]);
-    assert!(!file("folder.json.part").exists());
+    let line = complaint(&["train", "--total-steps", "1", "--out", folder.to_str().unwrap()]);
+    assert!(line.contains("is a folder, expected a file"), "{line}");
+}
+
+/// Where a result cannot go is said before anything is computed; and it never takes the place of another file.
+#[test]
+fn results_go_where_they_can_be_written() {
+    let folder = file("outputs");
+    std::fs::create_dir_all(&folder).unwrap();
+    let at = |name: &str| folder.join(name).to_str().unwrap().to_owned();
+    let train = |out: &str| ape(&["train", "--total-steps", "4096", "--out", out]).status.success();
+    let (ensemble, long) = (at("ensemble.json"), at(&"x".repeat(300)));
+    assert!(train(&ensemble));
+    let before = std::fs::read(&ensemble).unwrap();
+    let slash = at("new.json/");
+    // A run of all updates there can be would not end.
+    for (files, expected) in [
+        (vec!["--out", ""], "--out : expected the name of a file"),
+        (vec!["--out", &slash], "expected the name of a file"),
+        (vec!["--out", &long], "File name too long"),
+        (vec!["--curve", &ensemble, "--out", &ensemble], "which is another file of this command"),
+        (vec!["--config", &ensemble, "--out", &ensemble], "which is another file of this command"),
+    ] {
+        let line = complaint(&[&["train", "--batch-steps", "64", "--total-steps", "640000000"], &files[..]].concat());
+        assert!(line.contains(expected), "{line}");
+    }
+    let line = complaint(&["attack", &ensemble, "--out", &ensemble]);
+    assert!(line.contains("which is another file of this command"), "{line}");
+    assert_eq!(std::fs::read(&ensemble).unwrap(), before);
+    // A name as long as names can be.
+    assert!(train(&at(&"y".repeat(255))));
+    assert!(
+        std::fs::read_dir(&folder).unwrap().all(|file| !file.unwrap().file_name().to_str().unwrap().ends_with(".part"))
+    );
+}
+
+/// What is no file is written to, not replaced: what a link stands for, or who listens at a pipe.
+#[cfg(unix)]
+#[test]
+fn links_and_pipes_stay_what_they_are() {
+    use std::os::unix::fs::FileTypeExt;
+    let folder = file("links");
+    let _ = std::fs::remove_dir_all(&folder);
+    std::fs::create_dir_all(&folder).unwrap();
+    let (link, target, pipe) = (folder.join("link.json"), folder.join("target.json"), folder.join("pipe"));
+    std::fs::write(&target, "old").unwrap();
+    std::os::unix::fs::symlink("target.json", &link).unwrap();
+    assert!(Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+    let grid = |out: &PathBuf| ape(&["model", "--out", out.to_str().unwrap()]).status.success();
+    assert!(grid(&link) && link.is_symlink());
+    let model = std::fs::read_to_string(&target).unwrap();
+    assert!(model.starts_with("{\"format\""), "{}", &model[..40.min(model.len())]);
+    let heard = std::thread::scope(|scope| {
+        let listener = scope.spawn(|| std::fs::read_to_string(&pipe).unwrap());
+        assert!(grid(&pipe));
+        listener.join().unwrap()
+    });
+    assert!(heard == model && pipe.metadata().unwrap().file_type().is_fifo());
+}
+
+/// Half a result is no success, and help that nobody reads is no crash.
+#[cfg(target_os = "linux")]
+#[test]
+fn an_output_that_takes_nothing_is_a_failure_with_a_sentence() {
+    let full = || std::fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
+    let command = || Command::new(env!("CARGO_BIN_EXE_ape"));
+    for arguments in [&["model"][..], &["presets"], &["train", "--help"], &["--version"]] {
+        let output = command().args(arguments).stdout(full()).stderr(std::process::Stdio::piped()).output().unwrap();
+        let line = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(2), "{arguments:?} {line}");
+        assert!(line.starts_with("ape: standard output: No space left"), "{line}");
+    }
+    let output = command().args(["evaluate", "no-such-file"]).stderr(full()).output().unwrap();
+    assert_eq!(output.status.code(), Some(2));
 }
 
 /// The model is that of the grid the flags start from, a given ensemble's too, with no flags of a training run.
@@ -243,6 +336,8 @@ fn an_ensemble_file_is_attacked() {
     assert_eq!((&lines[2]["pairs"], &lines[3]["drop"]), (&json!(20_000), &Value::Null));
     assert!(lines[5]["returns"]["horizon_error"].as_f64() > Some(0.0));
     assert_eq!(std::fs::read_to_string(csv).unwrap().lines().count(), 1 + names.len());
+    let many = vec!["uniform"; 101].join(",");
+    assert!(complaint(&["attack", path, "--attackers", &many]).contains("101 of them, expected at most 100"));
     let line = complaint(&["attack", path, "--attackers", "uniform,thief"]);
     assert!(line.contains("\"thief\": must be one of uniform; occupancy;") && line.contains("or all"), "{line}");
 }
@@ -390,7 +485,7 @@ fn bad_shards_get_one_sentence_and_are_left_alone() {
     for (bytes, expected) in [
         (whole.as_bytes()[..whole.len() / 2].to_vec(), "not a shard of a sweep: EOF"),
         (Vec::new(), "not a shard of a sweep: EOF"),
-        (vec![0xff, 0xfe], "valid UTF-8"),
+        (vec![0xff, 0xfe], "a text in UTF-8"),
         (b"[".repeat(100_000), "not a shard of a sweep: "),
         (replace("\"success\":", "\"success\":NaN,\"s\":"), "not a shard of a sweep: expected value"),
         (replace("\"success\":", "\"success\":1e999,\"s\":"), "not a shard of a sweep: number out of range"),

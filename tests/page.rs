@@ -22,6 +22,7 @@ struct Desk {
     events: VecDeque<Result<Event, String>>,
     commands: Vec<Command>,
     starts: u32,
+    hangs: bool,
 }
 
 #[derive(Clone, Default)]
@@ -44,6 +45,9 @@ impl Link for Here {
 
     fn receive(&mut self) -> Option<Result<Event, String>> {
         let desk = &mut *self.0.borrow_mut();
+        if desk.hangs {
+            return None;
+        }
         if desk.events.is_empty() {
             // A tenth of a second of the session's time goes by between two looks.
             desk.now += 100.0;
@@ -58,6 +62,7 @@ impl Link for Here {
     fn restart(&mut self) {
         let desk = &mut *self.0.borrow_mut();
         desk.session = Session::new();
+        desk.hangs = false;
         desk.starts += 1;
         desk.events = VecDeque::from([Ok(Event::Ready { protocol: PROTOCOL })]);
     }
@@ -321,6 +326,68 @@ fn a_worker_that_makes_no_sense_is_replaced() {
         page.state().as_ref().unwrap().is_session_alive()
     };
     assert_eq!([(); 4].map(|()| send(&mut page)), [true, true, true, false]);
+}
+
+/// Between a move of β and the first word of its run the page shows another run: its digest does not go with this β.
+#[test]
+fn a_new_beta_has_no_digest_before_its_run() {
+    let (mut page, here) = open(1280.0, 800.0);
+    here.0.borrow_mut().hangs = true;
+    for beta in [0.3, 0.2] {
+        page.state_mut().as_mut().unwrap().set_beta(beta);
+        page.run_steps(4);
+        page.get_by(|node| node.role() == Role::Status && says(node).is_some_and(|text| text == "retraining …"));
+        assert!(!page.state().as_ref().unwrap().can_export());
+    }
+    // That the run of the first β has begun, or an old picture comes, is not yet the run of the second.
+    here.0.borrow_mut().hangs = false;
+    settle(&mut page);
+    let (started, _) = page.state().as_ref().unwrap().shown().unwrap();
+    assert_eq!(started.setup.config.beta, 0.2);
+    // A run that is refused is not waited for.
+    here.0.borrow_mut().hangs = true;
+    page.state_mut().as_mut().unwrap().set_beta(0.1);
+    here.0.borrow_mut().events.push_back(Ok(Event::Refused("Not today.".to_owned())));
+    here.0.borrow_mut().session = Session::new();
+    here.0.borrow_mut().hangs = false;
+    page.run_steps(4);
+    assert!(!page.state().as_ref().unwrap().is_retraining());
+}
+
+/// It has not said that it is gone, and may only be slow: it is the visitor who decides.
+#[test]
+fn a_worker_that_hangs_can_be_replaced() {
+    let (mut page, here) = open(1280.0, 800.0);
+    let is_offered = |page: &Page| {
+        page.query_by(|node| says(node).is_some_and(|text| text.starts_with("The worker does not answer"))).is_some()
+    };
+    let pass = |page: &mut Page, seconds: u32| {
+        for _ in 0..seconds {
+            let now = page.ctx.input(|input| input.time);
+            page.input_mut().time = Some(now + 1.0);
+            page.step();
+        }
+    };
+    // A page at rest expects nothing.
+    here.0.borrow_mut().hangs = true;
+    pass(&mut page, 60);
+    assert!(!is_offered(&page));
+    // That a run has begun is said at once.
+    page.state_mut().as_mut().unwrap().load_preset(1);
+    page.step();
+    // A page that was hidden for an hour has waited for a second of it.
+    let now = page.ctx.input(|input| input.time);
+    page.input_mut().time = Some(now + 3600.0);
+    page.step();
+    assert!(!is_offered(&page));
+    pass(&mut page, 8);
+    assert!(!is_offered(&page));
+    pass(&mut page, 4);
+    assert!(is_offered(&page));
+    page.get_by_label("Restart the worker").click_accesskit();
+    settle(&mut page);
+    assert!(!is_offered(&page));
+    assert_eq!((here.0.borrow().starts, page.state().as_ref().unwrap().preset()), (2, Some(1)));
 }
 
 #[test]
@@ -646,6 +713,31 @@ fn a_slow_clone_can_be_shown_in_a_panel() {
     });
 }
 
+/// What was wanted of a run that is gone comes no more, and its button works again.
+#[test]
+fn an_ensemble_that_never_came_can_be_asked_for_again() {
+    let desktop = Desktop::default();
+    let (mut page, here) = open_with(1280.0, 800.0, desktop.clone());
+    let save = |page: &mut Page| {
+        press(page, "Export and open");
+        page.get_by_label_contains("Ensemble as JSON").click_accesskit();
+        page.step();
+    };
+    let asked = || here.0.borrow().commands.iter().filter(|&command| *command == Command::Export).count();
+    here.0.borrow_mut().hangs = true;
+    save(&mut page);
+    // The session's answer is lost, as with a session that has stopped.
+    here.0.borrow_mut().session.events();
+    here.0.borrow_mut().hangs = false;
+    page.run_steps(3);
+    assert_eq!((asked(), desktop.saved.borrow().len()), (1, 0));
+    page.state_mut().as_mut().unwrap().load_preset(1);
+    settle(&mut page);
+    save(&mut page);
+    page.run_steps(6);
+    assert_eq!((asked(), desktop.saved.borrow().len()), (2, 1));
+}
+
 #[test]
 fn the_algorithm_can_be_exact_and_brings_its_observer() {
     let (mut page, _) = open(1280.0, 800.0);
@@ -888,6 +980,18 @@ fn an_address_brings_everything_back() {
         assert_eq!(second.address.borrow().split("&digest").next(), fragment.split("&digest").next());
     }
     assert_eq!(page.state().as_ref().unwrap().preset(), Some(6));
+    // An ensemble that is given has no updates; and a digest that it does not have is said.
+    second.visits.borrow_mut().push("v=1&ensemble=trap&digest=0123456789abcdef".to_owned());
+    page.run_steps(2);
+    until(&mut page, "given ensemble, nothing to train, but the link was made with 0123456789abcdef");
+    page.run_steps(40);
+    assert_eq!(*second.address.borrow(), "v=1&ensemble=trap");
+    second.visits.borrow_mut().push(format!("v=1&ensemble=trap&at=5&file={}", "A".repeat(1000)));
+    page.run_steps(2);
+    page.get_by(|node| says(node).is_some_and(|text| text.contains("at=5: expected none with a given ensemble")));
+    second.visits.borrow_mut().push(format!("v=1&file={}", "A".repeat(1000)));
+    page.run_steps(2);
+    page.get_by(|node| says(node).is_some_and(|text| text.contains(&format!("of {}, which is not", "A".repeat(40)))));
 }
 
 /// Every step sets its stage, and every sentence of it has figures of the ensemble that is there.

@@ -3,9 +3,9 @@
 
 use std::cell::Cell;
 
-use ape_lab::ape::{Config, Digest, Trainer};
+use ape_lab::ape::{Config, Digest, EnsembleFile, Trainer};
 use ape_lab::attack::AttackerChoice;
-use ape_lab::experiment::{Course, Preset, Setup, Sweep, Task};
+use ape_lab::experiment::{Course, Preset, Race, Setup, Sweep, Task};
 use ape_lab::lab::{
     Command, Event, Exported, Link, PROTOCOL, Pace, RunState, Session, Snapshot, Started, TaskEvent, ThreadLink,
     decode, encode, thread_pool,
@@ -355,6 +355,51 @@ fn a_pool_does_every_task_once() {
     assert!(pool.receive().is_empty());
 }
 
+/// What is said of how far a task is grows from 0 to 1, whatever the task.
+#[test]
+fn progress_grows_from_nothing_to_all() {
+    let setup = Box::new(Setup { config: short(), ..Setup::default() });
+    let grid = Grid::new(setup.grid.clone()).unwrap();
+    let ensemble = Trainer::new(grid.clone(), short()).unwrap().ensemble();
+    let file = EnsembleFile::new(&grid, &ensemble, None);
+    let attack = |attacker: &str| Task::Attack {
+        ensemble: Box::new(file.clone()),
+        attacker: attacker.parse().unwrap(),
+        horizon: 100,
+        seed: 1,
+    };
+    let race = |cloner: &str| {
+        let cloner = cloner.parse().unwrap();
+        let (expert, start) = (None, (5, 5));
+        Task::Race(Box::new(Race {
+            ensemble: file.clone(),
+            cloner,
+            expert,
+            start,
+            horizon: 100,
+            episodes: 300,
+            seed: 1,
+            luck: 2,
+        }))
+    };
+    let attackers = vec![AttackerChoice::UNIFORM, "bc(200)".parse().unwrap()];
+    let mut tasks = vec![Task::Table1 { setup: setup.clone(), attackers }, Task::Sweep { setup }];
+    tasks.extend(["bc(2000)", "gru(1)", "history_k(2)", "filtered"].map(attack));
+    tasks.extend(["occupancy", "history"].map(race));
+    for task in tasks {
+        let mut heard = Vec::new();
+        let outcome = task.run(&|| 0.0, &mut |share| {
+            heard.push(share);
+            true
+        });
+        assert!(outcome.unwrap().is_some());
+        let grows = heard.is_sorted() && heard.iter().all(|share| (0.0..=1.0).contains(share));
+        // What is done at once need not say anything.
+        let is_short = matches!(&task, Task::Attack { attacker, .. } if ["history_k", "filtered"].contains(&attacker.model().name));
+        assert!(grows && heard.is_empty() == is_short, "{task:?}: {heard:?}");
+    }
+}
+
 /// The thread behind the native window: ready, a whole run, and a new thread when asked for.
 #[test]
 fn a_thread_runs_a_session() {
@@ -407,9 +452,48 @@ fn every_update_can_be_sought() {
     desk.send(Command::Seek { run: run + 1, update: 2 });
     desk.run(1e6);
     assert_eq!(desk.last().update, 20);
+    // A run that plays stops there.
+    desk.send(Command::Speed(Some(100.0)));
+    desk.load(short(), true);
+    desk.run(100.0);
+    let run = desk.started.last().unwrap().run;
+    assert!((desk.last().run, desk.last().state) == (run, RunState::Playing) && desk.last().update > 2);
+    desk.send(Command::Seek { run, update: 2 });
+    desk.run(1e6);
+    assert_eq!((desk.last().run, desk.last().update, desk.last().state), (run, 2, RunState::Paused));
+    // One of which nothing is shown before its end has no past to look at.
+    desk.send(Command::Retrain { beta: 0.5 });
+    desk.advance();
+    let run = desk.started.last().unwrap().run;
+    desk.send(Command::Seek { run, update: 1 });
+    desk.run(1e6);
+    assert_eq!((desk.last().run, desk.last().update, desk.last().state), (run, 20, RunState::Finished));
 }
 
 /// Another β from a moment that lies back is another run with the same past; what is written of its course makes it again.
+/// Where updates take long a moment is made again bit by bit, and the newest wish counts.
+#[test]
+fn a_long_way_back_does_not_hold_the_session() {
+    let mut desk = Desk::new();
+    desk.load(short(), true);
+    desk.run(10_000.0);
+    let run = desk.last().run;
+    // A look at the clock takes longer than a stretch of work, so each turn makes one update.
+    desk.tick = 1000.0;
+    let taken = desk.snapshots.len();
+    desk.send(Command::Seek { run, update: 7 });
+    assert_eq!([desk.advance(), desk.advance()], [Pace::Now; 2]);
+    desk.send(Command::Seek { run, update: 5 });
+    let turns = (1..20).find(|_| desk.advance() != Pace::Now || desk.snapshots.len() > taken).unwrap();
+    assert_eq!((turns, desk.last().update), (5, 5));
+    assert_eq!(desk.last().digest, digest_after(short(), 5));
+    // What needs the moment has it, whatever it takes.
+    desk.send(Command::Seek { run, update: 6 });
+    desk.send(Command::Export);
+    desk.run(100_000.0);
+    assert_eq!((desk.exported.len(), desk.last().update), (1, 6));
+}
+
 #[test]
 fn a_branch_goes_on_from_the_past_and_can_be_made_again() {
     let mut desk = Desk::new();
@@ -508,6 +592,62 @@ fn a_run_is_resumed_where_it_was_seen() {
             assert_eq!(again.last().number, 1);
         }
     }
+}
+
+/// A run that is being made again gives way to a new β at once, unless somebody waits for it.
+#[test]
+fn a_new_beta_need_not_wait_for_a_run_that_is_made_again() {
+    let resume = || Command::Resume {
+        run: 4,
+        setup: Box::new(Setup { config: short(), ..Setup::default() }),
+        recorded: short().updates(),
+        update: 3,
+        is_playing: false,
+    };
+    let mut desk = Desk::new();
+    desk.send(resume());
+    desk.advance();
+    desk.send(Command::Retrain { beta: 7.0 });
+    assert_eq!((desk.refused.len(), desk.started.len()), (1, 0));
+    desk.send(Command::Seek { run: 4, update: 1 });
+    desk.send(Command::Pause);
+    desk.send(Command::Play);
+    desk.send(Command::Retrain { beta: 0.3 });
+    assert_eq!((desk.started.len(), desk.started[0].run, desk.started[0].setup.config.beta), (1, 5, 0.3));
+    desk.run(1e6);
+    assert!(desk.snapshots.iter().all(|snapshot| (snapshot.run, snapshot.beta) == (5, 0.3)));
+    assert_eq!(desk.last().update, short().updates());
+
+    let mut desk = Desk::new();
+    desk.send(resume());
+    desk.send(Command::Export);
+    desk.send(Command::Retrain { beta: 0.3 });
+    assert_eq!((desk.exported.len(), desk.started.len()), (0, 0));
+    desk.run(1e6);
+    assert_eq!((desk.exported[0].run, desk.exported[0].update), (4, 3));
+    assert_eq!((desk.started[0].run, desk.last().run, desk.last().update), (5, 5, short().updates()));
+}
+
+/// A run that is made again also goes back to where it was a few milliseconds at a time.
+#[test]
+fn a_run_that_is_made_again_works_in_short_turns() {
+    let config = Config { total_steps: 10_000 * 4096, ..Config::default() };
+    let setup = Box::new(Setup { config, ..Setup::default() });
+    let mut desk = Desk::new();
+    desk.send(Command::Resume { run: 1, setup, recorded: 40, update: 39, is_playing: false });
+    // Of an update as slow as this a turn does no more than one or two.
+    desk.tick = 5.0;
+    let mut turns = 0;
+    while desk.snapshots.is_empty() {
+        let begin = desk.now.get();
+        desk.advance();
+        let looks = (desk.now.get() - begin) / desk.tick;
+        assert!(looks < 8.0, "{looks} looks at the clock in a turn");
+        turns += 1;
+    }
+    assert_eq!((desk.last().update, desk.last().recorded), (39, 40));
+    // Forty updates, and seven of them again.
+    assert!(turns >= 40 + 7 / 2, "{turns}");
 }
 
 #[test]

@@ -196,11 +196,11 @@ fn snapshots_fit_their_grid_and_are_made_of_numbers() {
     wrong(&|snapshot| _ = snapshot.experts[1].hitting_time.pop(), "5 hitting times: expected 6");
     wrong(&|snapshot| snapshot.experts[1].hitting_time[1] = f32::INFINITY, "a hitting time of inf");
     wrong(&|snapshot| snapshot.clones[0].contexts.push(0.5), "13 probabilities of contexts: expected 12");
-    wrong(&|snapshot| snapshot.clones[0].view.returns.capped_return = Some(f64::NAN), "a return of NaN");
-    wrong(&|snapshot| snapshot.ensemble.success = f64::NEG_INFINITY, "a return of -inf");
+    wrong(&|snapshot| snapshot.clones[0].view.returns.capped_return = Some(f64::NAN), "capped_return NaN: expected");
+    wrong(&|snapshot| snapshot.ensemble.success = f64::NEG_INFINITY, "success -inf: expected a number from 0 to 1");
     wrong(&|snapshot| snapshot.beta = 3.0, "β 3: expected a number from 0 to 2");
     wrong(&|snapshot| snapshot.course.turns = vec![(1, 0.5); 10_001], "10001 turns of β");
-    wrong(&|snapshot| snapshot.curve[0].clone.horizon_return = f64::NAN, "a return of NaN");
+    wrong(&|snapshot| snapshot.curve[0].clone.horizon_return = f64::NAN, "horizon_return NaN: expected");
     wrong(&|snapshot| snapshot.curve = vec![snapshot.curve[0]; 10_001], "10001 points of the curve");
     let mut other = started.clone();
     other.optimal.policy.pop();

@@ -24,14 +24,15 @@
       const times = count > 1 ? " × " + count : "";
       return "  " + ((time - now) / 1000).toFixed(3) + " s  " + text + times;
     });
-    const dark = matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light";
+    const system = matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light";
+    const theme = document.documentElement.dataset.theme ?? system;
     return [
       "ape-lab " + (window.pageVersion ?? "(not started)"),
       "What: " + fault,
       "When: " + new Date(now).toISOString(),
       "Page: " + location.href,
       "Browser: " + navigator.userAgent,
-      "Window: " + innerWidth + " × " + innerHeight + " at " + devicePixelRatio + ", " + dark,
+      "Window: " + innerWidth + " × " + innerHeight + " at " + devicePixelRatio + ", " + theme,
       "Last messages:",
       ...(lines.length > 0 ? lines : ["  none"]),
       ...(stack ? ["Stack:", String(stack)] : []),

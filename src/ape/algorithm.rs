@@ -214,13 +214,50 @@ fn add_entropy_bonus(
         if weight == 0.0 {
             continue;
         }
-        // One logarithm for five: log π(a) = θ_a − max θ + log max π.
-        let top = |row: &[f64; ACTIONS]| row.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        let shift = libm::log(top(pi)) - top(logits);
-        let log = logits.map(|logit| logit + shift);
-        let entropy: f64 = -pi.iter().zip(&log).map(|(p, log)| p * log).sum::<f64>();
+        // −π(b) (log π(b) + H) with log π = θ − log Σ exp θ, where the last term drops out.
+        let mean: f64 = pi.iter().zip(logits).map(|(p, logit)| p * logit).sum();
         for b in 0..ACTIONS {
-            gradient[b] -= weight * pi[b] * (log[b] + entropy);
+            gradient[b] -= weight * pi[b] * (logits[b] - mean);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mdp::GridSpec;
+
+    /// Of both algorithms: shares that grow from 0 towards 1, and an end as soon as nobody wants more.
+    #[test]
+    fn progress_is_the_share_of_the_run_that_is_done() {
+        for algorithm in [AlgorithmKind::PgApe, AlgorithmKind::Exact] {
+            let config =
+                Config { algorithm, batch_steps: 64, total_steps: 64 * 160, exact_updates: 160, ..Config::default() };
+            let mut trainer = Trainer::new(Grid::new(GridSpec::default()).unwrap(), config).unwrap();
+            let mut heard = Vec::new();
+            assert!(!trainer.finish(&mut |done| {
+                heard.push(done);
+                heard.len() < 2
+            }));
+            assert_eq!((trainer.updates(), &heard), (64, &vec![0.0, 0.4]));
+            assert!(trainer.finish(&mut |done| {
+                heard.push(done);
+                true
+            }));
+            assert_eq!((trainer.updates(), heard), (160, vec![0.0, 0.4, 0.4, 0.8]));
+        }
+    }
+
+    /// A copy has at least its parameters and Adam's two moments of each.
+    #[test]
+    fn a_copy_takes_its_parameters_three_times() {
+        for algorithm in [AlgorithmKind::PgApe, AlgorithmKind::Exact] {
+            for experts in [2, 8] {
+                let config = Config { algorithm, experts, ..Config::default() };
+                let trainer = Trainer::new(Grid::new(GridSpec::default()).unwrap(), config).unwrap();
+                let least = 3 * 8 * experts as usize * 100 * ACTIONS;
+                assert!((least..least + 50_000).contains(&trainer.bytes()), "{algorithm:?}: {}", trainer.bytes());
+            }
         }
     }
 }

@@ -33,21 +33,26 @@ impl Step {
     }
 }
 
-/// Where episodes are played, and by which policies. A place is a state times n: the number of its first pair (state,
-/// context), `s · n + c`.
+/// Where episodes are played, and by which policies. Its pairs (state, context) are numbered `s · n + c`.
 pub struct Course {
     /// `[S][n]`.
-    actions: Vec<ActionDraw>,
-    /// The place that each executed action leads to, by the set of those before it; [`Course::GOAL`] for the goal. At each
-    /// state's place; what is between them is not used.
-    next: Vec<[u16; ActionDraw::SETS]>,
-    /// Places where an episode may start.
+    pairs: Vec<Pair>,
+    /// First pairs of states where an episode may start.
     starts: Vec<u32>,
     experts: usize,
     slip: Draw<1>,
     is_slippery: bool,
     /// Where a walker's clock is when its time is over.
     end: u32,
+}
+
+/// What a walker meets at a state, in a context.
+#[derive(Clone)]
+struct Pair {
+    action: ActionDraw,
+    /// The pair that each executed action leads to, in the same context, by the set of those before it;
+    /// [`Course::GOAL`] for the goal.
+    next: [u16; ActionDraw::SETS],
 }
 
 impl Course {
@@ -58,13 +63,12 @@ impl Course {
         let next = |pair: usize| {
             std::array::from_fn(|passed| {
                 let next = grid.next(pair / experts)[ActionDraw::after(passed)] as usize;
-                if next == grid.goal() { Self::GOAL } else { (next * experts) as u16 }
+                if next == grid.goal() { Self::GOAL } else { (next * experts + pair % experts) as u16 }
             })
         };
-        let pairs = grid.cells() * experts;
+        let action = ActionDraw::new(&[1.0]);
         Course {
-            actions: vec![ActionDraw::new(&[1.0]); pairs],
-            next: (0..pairs).map(next).collect(),
+            pairs: (0..grid.cells() * experts).map(|pair| Pair { action, next: next(pair) }).collect(),
             starts: grid.starts().iter().map(|&state| state * experts as u32).collect(),
             experts,
             slip: Draw::new(&[1.0 - grid.slip(), grid.slip()]),
@@ -76,18 +80,19 @@ impl Course {
     /// From now on these are the experts.
     pub fn set(&mut self, ensemble: &Ensemble) {
         for (context, policy) in ensemble.policies().iter().enumerate() {
-            let draws = self.actions[context..].iter_mut().step_by(self.experts);
-            policy.rows().iter().zip(draws).for_each(|(pi, draw)| *draw = ActionDraw::new(pi));
+            let pairs = self.pairs[context..].iter_mut().step_by(self.experts);
+            policy.rows().iter().zip(pairs).for_each(|(pi, pair)| pair.action = ActionDraw::new(pi));
         }
     }
 
     /// Where an episode begins, and which expert is drawn for it. Not often, so it is kept out of the way.
     #[cold]
     #[inline(never)]
-    fn start(&self, starts: &mut Starts<impl Rng>) -> Walker {
+    fn start<P: Player>(&self, starts: &mut Starts<impl Rng>) -> Walker {
         starts.drawn = starts.drawn.wrapping_add(1);
         let drawn = one_of(self.starts.len() * self.experts, starts.rng.next_u32());
-        Walker { place: self.starts[drawn / self.experts] as usize, context: drawn % self.experts, clock: 0 }
+        let first = self.starts[drawn / self.experts] as usize;
+        Walker { at: if P::DRAWS { first } else { first + drawn % self.experts }, clock: 0 }
     }
 }
 
@@ -117,11 +122,12 @@ impl Luck<Xoshiro256PlusPlus> {
 
 /// Who says which expert acts.
 pub trait Player {
-    /// Whether that takes 32 random bits.
+    /// Whether the expert is drawn anew at each step, which takes 32 random bits, and not for an episode.
     const DRAWS: bool;
 
-    /// The context that acts at a place, in an episode that this expert was drawn for.
-    fn context(&self, place: usize, drawn: usize, bits: u32) -> usize;
+    /// The pair of a walker's state and the context that acts there. Where contexts are drawn, the walker is at the first of
+    /// its state's pairs.
+    fn pair(&self, at: usize, bits: u32) -> usize;
 }
 
 /// The ensemble: an expert acts for all of an episode.
@@ -131,14 +137,14 @@ impl Player for EnsemblePlayer {
     const DRAWS: bool = false;
 
     #[inline(always)]
-    fn context(&self, _place: usize, drawn: usize, _bits: u32) -> usize {
-        drawn
+    fn pair(&self, at: usize, _bits: u32) -> usize {
+        at
     }
 }
 
 /// The clone: the expert is drawn anew at each step. Of `ENDS` + 1 experts at most.
 pub struct ClonePlayer<const ENDS: usize> {
-    /// By place: `[S][n]`, the same for all n.
+    /// `[S][n]`, the same for all n.
     pub contexts: Vec<Draw<ENDS>>,
 }
 
@@ -146,8 +152,8 @@ impl<const ENDS: usize> Player for ClonePlayer<ENDS> {
     const DRAWS: bool = true;
 
     #[inline(always)]
-    fn context(&self, place: usize, _drawn: usize, bits: u32) -> usize {
-        self.contexts[place].outcome(bits)
+    fn pair(&self, at: usize, bits: u32) -> usize {
+        at + self.contexts[at].outcome(bits)
     }
 }
 
@@ -167,19 +173,18 @@ pub trait RememberingPlayer {
 struct Known(usize);
 
 impl Player for Known {
-    const DRAWS: bool = false;
+    const DRAWS: bool = true;
 
-    fn context(&self, _place: usize, _drawn: usize, _bits: u32) -> usize {
-        self.0
+    fn pair(&self, at: usize, _bits: u32) -> usize {
+        at + self.0
     }
 }
 
 /// A walker under way.
-#[derive(Clone, Copy, Default)]
+#[derive(Clone, Copy)]
 struct Walker {
-    place: usize,
-    /// The expert that was drawn for its episode.
-    context: usize,
+    /// A pair of its state: that of the expert drawn for the episode, or the first where experts are drawn anew.
+    at: usize,
     /// Steps of its episode so far, in ticks.
     clock: u32,
 }
@@ -187,16 +192,16 @@ struct Walker {
 impl Walker {
     /// One step; after an episode's last, a new one begins.
     #[inline(always)]
-    fn step<const SLIPS: bool>(
+    fn step<const SLIPS: bool, P: Player>(
         &mut self,
         course: &Course,
-        player: &impl Player,
+        player: &P,
         bits: u64,
         steps: &mut impl Rng,
         starts: &mut Starts<impl Rng>,
     ) -> Step {
-        let pair = self.place + player.context(self.place, self.context, (bits >> 32) as u32);
-        let passed = course.actions[pair].passed(bits as u32);
+        let pair = player.pair(self.at, (bits >> 32) as u32);
+        let passed = course.pairs[pair].action.passed(bits as u32);
         let action = ActionDraw::after(passed);
         let mut executed = passed;
         if SLIPS {
@@ -205,11 +210,11 @@ impl Walker {
             executed = if course.slip.outcome((bits >> 32) as u32) == 1 { other } else { passed };
         }
         let step = Step((pair * ACTIONS + action) as u32 + self.clock);
-        let next = course.next[self.place][executed % ActionDraw::SETS];
-        self.place = usize::from(next);
+        let next = course.pairs[self.at].next[executed % ActionDraw::SETS];
+        self.at = usize::from(next);
         self.clock += Step::TICK;
         if (next == Course::GOAL) | (self.clock == course.end) {
-            *self = course.start(starts);
+            *self = course.start::<P>(starts);
         }
         step
     }
@@ -253,19 +258,19 @@ impl Batch {
         let rounds = if is_much { wanted.div_ceil(WALKERS as u32) as usize } else { 0 };
         self.rows.resize(rounds, [Step::default(); WALKERS]);
         let before = luck.starts.drawn;
-        let [mut a, mut b, mut c, mut d] = [(); WALKERS].map(|()| course.start(&mut luck.starts));
+        let [mut a, mut b, mut c, mut d] = [(); WALKERS].map(|()| course.start::<P>(&mut luck.starts));
         // A copy close at hand, which stays in registers.
         let mut steps = luck.steps.clone();
         for row in &mut self.rows {
             let bits = steps.next_u64();
-            row[0] = a.step::<SLIPS>(course, player, bits, &mut steps, &mut luck.starts);
+            row[0] = a.step::<SLIPS, P>(course, player, bits, &mut steps, &mut luck.starts);
             // Of 64 bits, two walkers take a half each where that is enough.
             let bits = if P::DRAWS { steps.next_u64() } else { bits >> 32 };
-            row[1] = b.step::<SLIPS>(course, player, bits, &mut steps, &mut luck.starts);
+            row[1] = b.step::<SLIPS, P>(course, player, bits, &mut steps, &mut luck.starts);
             let bits = steps.next_u64();
-            row[2] = c.step::<SLIPS>(course, player, bits, &mut steps, &mut luck.starts);
+            row[2] = c.step::<SLIPS, P>(course, player, bits, &mut steps, &mut luck.starts);
             let bits = if P::DRAWS { steps.next_u64() } else { bits >> 32 };
-            row[3] = d.step::<SLIPS>(course, player, bits, &mut steps, &mut luck.starts);
+            row[3] = d.step::<SLIPS, P>(course, player, bits, &mut steps, &mut luck.starts);
         }
         luck.steps = steps;
         let mut played = WALKERS * rounds;
@@ -273,7 +278,7 @@ impl Batch {
             tail.clear();
             while walker.clock > 0 || played < wanted as usize {
                 let bits = luck.steps.next_u64();
-                tail.push(walker.step::<SLIPS>(course, player, bits, &mut luck.steps, &mut luck.starts));
+                tail.push(walker.step::<SLIPS, P>(course, player, bits, &mut luck.steps, &mut luck.starts));
                 played += 1;
             }
         }
@@ -293,18 +298,18 @@ impl Batch {
         self.tails.iter_mut().for_each(Vec::clear);
         let before = luck.starts.drawn;
         let tail = &mut self.tails[0];
-        let mut walker = course.start(&mut luck.starts);
+        let mut walker = course.start::<Known>(&mut luck.starts);
         while walker.clock > 0 || tail.len() < wanted as usize {
             if walker.clock == 0 {
                 player.begin();
             }
-            let state = walker.place / course.experts;
+            let state = walker.at / course.experts;
             let bits = luck.steps.next_u64();
             let known = Known(player.context(state, (bits >> 32) as u32));
             let step = if course.is_slippery {
-                walker.step::<true>(course, &known, bits, &mut luck.steps, &mut luck.starts)
+                walker.step::<true, _>(course, &known, bits, &mut luck.steps, &mut luck.starts)
             } else {
-                walker.step::<false>(course, &known, bits, &mut luck.steps, &mut luck.starts)
+                walker.step::<false, _>(course, &known, bits, &mut luck.steps, &mut luck.starts)
             };
             player.acted(state, step.entry() % ACTIONS);
             tail.push(step);

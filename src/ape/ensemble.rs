@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{Config, Digest};
+use super::{Config, Digest, json};
 use crate::mdp::{ACTIONS, Grid, GridError, GridSpec, Policy, PolicyError, Returns, Solver, Value};
 
 /// n experts; one of them, drawn uniformly, acts for a whole episode.
@@ -135,23 +135,13 @@ pub enum EnsembleError {
     #[error("format {0:?}: must be \"ape-ensemble\"")]
     Format(String),
     #[error("version {0}: this program reads version 1")]
-    Version(u32),
+    Version(String),
     #[error("grid: {0}")]
     Grid(#[from] GridError),
     #[error("{0} experts: must be from 1 to {max}", max = Config::MAX_EXPERTS)]
     Experts(usize),
     #[error("expert {expert}: {error}")]
     Policy { expert: usize, error: PolicyError },
-}
-
-/// As much as a sentence can take of what is, or quotes, a part of a file.
-pub(crate) fn quoted(text: &impl ToString) -> String {
-    const MOST: usize = 300;
-    let text = text.to_string();
-    match text.char_indices().nth(MOST) {
-        Some((end, _)) => format!("{}…", &text[..end]),
-        None => text,
-    }
 }
 
 impl EnsembleFile {
@@ -173,37 +163,46 @@ impl EnsembleFile {
     pub const LONGEST: usize = 10_000_000;
 
     /// Reads the JSON text of a file; [`EnsembleFile::check`] then says whether it makes sense. A `config` that
-    /// is not ours is left out: it does not change what the ensemble is. So is a digest that is none, without a word.
+    /// is not ours, or not for this grid, is left out: it does not change what the ensemble is. So is a digest that is
+    /// none, without a word.
     pub fn parse(text: &str) -> Result<EnsembleFile, EnsembleError> {
         if text.len() > Self::LONGEST {
             return Err(EnsembleError::Long);
         }
-        let json = |error: serde_json::Error| EnsembleError::Json(quoted(&error));
-        let mut value: serde_json::Value = serde_json::from_str(text).map_err(json)?;
+        let mut value = json::parse(text).map_err(EnsembleError::Json)?;
         let mut take = |name| value.as_object_mut().and_then(|fields| fields.remove(name));
         let (config, digest) = (take("config"), take("digest"));
-        let digest = digest.and_then(|digest| serde_json::from_value(digest).ok());
-        let file = EnsembleFile { digest, ..serde_json::from_value(value).map_err(json)? };
-        let config = match config {
+        let digest = digest.and_then(|digest| json::read("digest", digest).ok());
+        let file = EnsembleFile { digest, ..json::read("", value).map_err(EnsembleError::Json)? };
+        let config: Result<Config, String> = match config {
             None | Some(serde_json::Value::Null) => return Ok(file),
-            Some(config) => serde_json::from_value(config).map_err(|error| quoted(&error)),
+            Some(config) => json::read("config", config),
         };
-        let config =
-            config.and_then(|config: Config| config.check().map(|()| config).map_err(|error| error.to_string()));
+        let fits = |config: &Config| {
+            config.check()?;
+            // A grid that is none is said by `check`.
+            Grid::new(file.grid.clone()).map_or(Ok(()), |grid| config.check_on(&grid))
+        };
+        let config = config.and_then(|config| fits(&config).map(|()| config).map_err(|error| error.to_string()));
         Ok(match config {
             Ok(config) => EnsembleFile { config: Some(config), ..file },
             Err(reason) => EnsembleFile { left_out: Some(reason), ..file },
         })
     }
 
+    /// Whether a file calls itself one of these.
+    pub fn check_format(format: &str, version: impl Into<serde_json::Value>) -> Result<(), EnsembleError> {
+        let version = version.into();
+        match (format == Self::FORMAT, version == 1) {
+            (false, _) => Err(EnsembleError::Format(json::quoted(&format))),
+            (_, false) => Err(EnsembleError::Version(json::quoted(&version))),
+            _ => Ok(()),
+        }
+    }
+
     /// The grid and the ensemble, when everything about them is valid.
     pub fn check(self) -> Result<(Grid, Ensemble), EnsembleError> {
-        if self.format != Self::FORMAT {
-            return Err(EnsembleError::Format(quoted(&self.format)));
-        }
-        if self.version != 1 {
-            return Err(EnsembleError::Version(self.version));
-        }
+        Self::check_format(&self.format, self.version)?;
         let grid = Grid::new(self.grid)?;
         if self.experts.is_empty() || self.experts.len() > Config::MAX_EXPERTS as usize {
             return Err(EnsembleError::Experts(self.experts.len()));

@@ -1,5 +1,7 @@
 //! A batch of episodes as far as learning needs it: how often each action was taken, and what followed.
 
+use std::hint::select_unpredictable;
+
 use super::batch::{Batch, WALKERS};
 use crate::mdp::ACTIONS;
 
@@ -51,17 +53,18 @@ impl Tally {
 
     #[inline(always)]
     fn add(&mut self, batch: &Batch, discount: f64, reward: impl Fn(usize) -> f64, weight: impl Fn(usize) -> f64) {
-        // The return that follows each walker's step before this one; 0 after an episode's end.
-        let mut later = [0.0; WALKERS];
+        // What follows each walker's step before this one: the return, and what it counts, nothing after an episode's end.
+        let mut later = [(0.0, 0.0); WALKERS];
         let entries = &mut self.entries[..];
         batch.backwards(|walker, step| {
-            let to_go = reward(step.entry()) + discount * later[walker];
+            let (to_go, factor) = later[walker];
+            let to_go = reward(step.entry()) + factor * to_go;
             let [count, returns] = &mut entries[step.entry()];
             *count += 1.0;
             *returns += weight(step.time()) * to_go;
             // Without a branch, which would often be mistaken.
-            let is_first = step.time() == 0;
-            later[walker] = f64::from_bits(to_go.to_bits() & u64::from(is_first).wrapping_sub(1));
+            let factor = select_unpredictable(step.time() == 0, 0, discount.to_bits());
+            later[walker] = (to_go, f64::from_bits(factor));
         });
     }
 }

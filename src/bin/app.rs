@@ -46,7 +46,7 @@ mod window {
 
     impl Host for Files {
         fn save(&mut self, name: &str, text: &str) -> Result<(), String> {
-            std::fs::write(name, text).map_err(|error| format!("{name} could not be written: {error}."))
+            ape_lab::files::write(name.as_ref(), text).map_err(|error| format!("{name} could not be written: {error}."))
         }
 
         fn save_picture(&mut self, _name: &str, _svg: &str) -> Result<(), String> {

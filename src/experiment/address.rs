@@ -36,7 +36,7 @@ pub fn bad<T>(name: &str, value: &str, expected: &str) -> Result<T, AddressError
 }
 
 /// As much of a name or a value as a sentence can take.
-fn shown(text: &str) -> String {
+pub fn shown(text: &str) -> String {
     text.chars().take(40).collect()
 }
 

@@ -1,8 +1,9 @@
 //! What a run starts from: a grid and a configuration.
 
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
 
-use crate::ape::{Config, ConfigError, EnsembleError, EnsembleFile, quoted};
+use crate::ape::{Config, ConfigError, EnsembleError, EnsembleFile, json};
 use crate::mdp::{Grid, GridError, GridSpec, HORIZON};
 
 /// What changed on the way of a run: together with grid and configuration it gives the same run again.
@@ -103,24 +104,39 @@ impl Setup {
         (&self.grid, experts, horizon) == (&GridSpec::default(), 2, HORIZON)
     }
 
-    /// Reads a configuration file: the fields of [`Config`], with a `grid` where it is not the paper's. An
-    /// ensemble file does too: its `grid` and `config` are taken.
+    /// Reads a configuration file: the fields of [`Config`], alone or as `config`, with a `grid` where it is not the
+    /// paper's. An ensemble file does too: its `grid` and `config` are taken.
     pub fn parse(text: &str) -> Result<Setup, SetupError> {
-        let json = |error: serde_json::Error| SetupError::Json(quoted(&error));
-        let value: serde_json::Value = serde_json::from_str(text).map_err(json)?;
-        let serde_json::Value::Object(mut fields) = value else {
-            return Err(SetupError::Json("expected an object of fields, as {\"beta\": 0.3, \"seed\": 2}".to_owned()));
+        let wrong = |sentence: &str| Err(SetupError::Json(sentence.to_owned()));
+        let Value::Object(mut fields) = json::parse(text).map_err(SetupError::Json)? else {
+            return wrong("expected an object of fields, as {\"beta\": 0.3, \"seed\": 2}");
         };
-        let grid: GridSpec =
-            fields.remove("grid").map_or(Ok(GridSpec::default()), serde_json::from_value).map_err(json)?;
-        let config = match fields.remove("config") {
-            // An ensemble file that does not say how it was made.
-            None | Some(serde_json::Value::Null) if fields.contains_key("format") => Config::default(),
-            Some(config) => serde_json::from_value(config).map_err(json)?,
-            None => serde_json::from_value(serde_json::Value::Object(fields)).map_err(json)?,
+        let grid = fields.remove("grid").map_or(Ok(GridSpec::default()), |grid| json::read("grid", grid));
+        let grid: GridSpec = grid.map_err(SetupError::Json)?;
+        let config = fields.remove("config");
+        let config = if let Some(format) = fields.get("format") {
+            let version = fields.get("version").cloned().unwrap_or_default();
+            EnsembleFile::check_format(format.as_str().unwrap_or_default(), version)?;
+            // It need not say how it was made.
+            config
+                .filter(|config| !config.is_null())
+                .map_or(Ok(Config::default()), |config| json::read("config", config))
+        } else if let Some(config) = config {
+            match fields.keys().next() {
+                Some(other) => {
+                    return wrong(&format!(
+                        "unknown field `{}` beside config, expected grid alone",
+                        json::quoted(other)
+                    ));
+                }
+                None => json::read("config", config),
+            }
+        } else {
+            json::read("", Value::Object(fields))
         };
-        Grid::new(grid.clone())?;
+        let config: Config = config.map_err(SetupError::Json)?;
         config.check()?;
+        config.check_on(&Grid::new(grid.clone())?)?;
         Ok(Setup { grid, config, ..Setup::default() })
     }
 }
@@ -150,6 +166,17 @@ mod tests {
         assert!(sentence(r#"{"betta": 0.5}"#).contains("unknown field `betta`"));
         assert!(sentence(r#"{"observer": "me"}"#).contains("must be one of uniform"));
         assert!(sentence(r#"{"grid": {"rows": 1, "cols": 4, "goal": [0, 0]}}"#).contains("1 × 4"));
+        assert_eq!(
+            sentence(r#"{"grid": {"rows": 3, "cols": 4, "goal": [0]}}"#),
+            "not a configuration: grid.goal: invalid length 1, expected a tuple of size 2"
+        );
+        assert!(sentence(r#"{"beta": "x"}"#).contains("beta: invalid type: string"));
+        assert!(sentence(r#"{"beta": 0.1, "beta": 0.2}"#).contains("\"beta\" stands there twice at line 1 column 20"));
+        assert!(sentence(r#"{"adversary_reward": "20,20=1"}"#).contains("adversary_reward 20,20: must be a cell"));
+        // What is in no field of ours was meant to be in one.
+        assert!(sentence(r#"{"config": {"seed": 2}, "beta": 1}"#).contains("unknown field `beta` beside config"));
+        assert!(sentence(r#"{"format": "ape-sweep-shard", "version": 1}"#).contains("must be \"ape-ensemble\""));
+        assert!(sentence(r#"{"format": "ape-ensemble", "version": 9}"#).contains("version 9"));
         assert!(sentence("[]").contains("expected an object"));
         assert!(sentence("{").contains("EOF"));
     }

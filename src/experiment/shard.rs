@@ -10,8 +10,9 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use super::{Setup, SetupError, Sweep, SweepRun, sweep};
-use crate::ape::{Config, Digest, Trainer, quoted};
-use crate::mdp::{Grid, GridSpec, KnownReturns, RETURN_KINDS};
+use crate::ape::json::quoted;
+use crate::ape::{Config, Digest, Trainer};
+use crate::mdp::{Grid, GridSpec, KnownReturns};
 
 /// Shard I of K, written `I/K`. Run r of a sweep, counted from 0, is in shard r mod K + 1, so that every shard has
 /// its share of every β.
@@ -180,6 +181,7 @@ impl SweepPlan {
             Config { beta, ..self.config.clone() }.check().map_err(SetupError::from)?;
         }
         sweep::check(&self.config).map_err(ShardError::Sweep)?;
+        Sweep::check_betas(&self.betas).map_err(|error| ShardError::Sweep(format!("sweep.betas: {error}")))?;
         Ok(self.setup(0).check()?)
     }
 
@@ -344,11 +346,7 @@ impl Shard {
             return wrong("expected every run once, in ascending order".to_owned());
         }
         let returns = [KnownReturns::from(run.ensemble), run.clone, run.occupancy];
-        let is_finite = |returns: &KnownReturns| {
-            let figures = (0..RETURN_KINDS.len()).filter_map(|kind| returns.get(kind));
-            figures.chain([returns.horizon_error, returns.success_error]).all(f64::is_finite)
-        };
-        if returns.iter().all(is_finite) { Ok(()) } else { wrong("expected finite figures".to_owned()) }
+        returns.iter().try_for_each(KnownReturns::check).or_else(wrong)
     }
 
     /// Takes over the runs that are done from an earlier file, which must be of the same shard of the same sweep.
@@ -528,11 +526,14 @@ mod tests {
         let before = shard.clone();
         let mut infinite = run(&plan, 6);
         infinite.occupancy.uncapped_return = Some(f64::NEG_INFINITY);
+        let mut certain = run(&plan, 6);
+        certain.clone.success = 1.5;
         for (index, run, expected) in [
             (2, run(&plan, 2), "run 2 (β 0, seed 3): expected a run of shard 2/5"),
             (1, run(&plan, 1), "run 1 (β 0, seed 2): expected every run once, in ascending order"),
             (6, run(&plan, 7), "run 6 (β 0.3, seed 4): expected β 0.3, seed 3 there"),
-            (6, infinite, "run 6 (β 0.3, seed 3): expected finite figures"),
+            (6, infinite, "run 6 (β 0.3, seed 3): uncapped_return -inf: expected a number from -1e300 to 0"),
+            (6, certain, "run 6 (β 0.3, seed 3): success 1.5: expected a number from 0 to 1"),
             (61, run(&plan, 1), "run 61 (β 0, seed 2): the sweep has 12 runs, expected an index below"),
         ] {
             assert_eq!(shard.add(index, run).unwrap_err().to_string(), expected);
@@ -600,6 +601,9 @@ mod tests {
         let plan = planned(Config::default());
         let many = Shard::new(plan.clone(), ShardNumber { shard: 1, shards: 13 }).unwrap_err();
         assert_eq!(many.to_string(), "1/13: the sweep has 12 runs, expected K from 1 to 12");
+        // A β made twice would count as another seed, whoever wrote the file.
+        let twice = SweepPlan { betas: vec![0.5, 0.0, 0.5], ..plan.clone() };
+        assert_eq!(twice.check().unwrap_err().to_string(), "sweep.betas: β 0.5 stands there twice, expected each once");
         let large = SweepPlan { betas: vec![0.5; 1000], seeds: 1000, ..plan };
         let error = Shard::new(large.clone(), ShardNumber { shard: 1, shards: 9 }).unwrap_err().to_string();
         assert_eq!(error, "1/9: 111112 runs in a shard, expected at most 100000: take 10 shards or more");

@@ -27,8 +27,11 @@ impl Summary {
         }
         let n = values.len() as f64;
         let mean = values.iter().sum::<f64>() / n;
-        let squares: f64 = values.iter().map(|value| (value - mean) * (value - mean)).sum();
-        let sd = if values.len() > 1 { (squares / (n - 1.0)).sqrt() } else { 0.0 };
+        // In a unit in which no square overflows: hitting times go up to 1e300.
+        let largest = values.iter().fold(0.0, |largest: f64, value| largest.max(value.abs()));
+        let unit = if largest > 1e100 { largest } else { 1.0 };
+        let squares: f64 = values.iter().map(|value| ((value - mean) / unit) * ((value - mean) / unit)).sum();
+        let sd = if values.len() > 1 { (squares / (n - 1.0)).sqrt() * unit } else { 0.0 };
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(0);
         let mut draw = || values[rng.random_range(0..values.len() as u32) as usize];
         let mut means: Vec<f64> = (0..RESAMPLES).map(|_| (0..values.len()).map(|_| draw()).sum::<f64>() / n).collect();
@@ -47,6 +50,8 @@ mod tests {
         assert_eq!(Summary::of(&[]), None);
         let one = Summary::of(&[2.5]).unwrap();
         assert_eq!((one.mean, one.sd, one.low, one.high, one.seeds), (2.5, 0.0, 2.5, 2.5, 1));
+        let far = Summary::of(&[-1e300, 0.0]).unwrap();
+        assert!((far.sd / 5e299 - f64::sqrt(2.0)).abs() < 1e-12 && far.low.is_finite(), "{far:?}");
         let values: Vec<f64> = (1..=100).map(f64::from).collect();
         let many = Summary::of(&values).unwrap();
         assert!((many.mean - 50.5).abs() < 1e-12 && (many.sd - 29.011_491_975_882_016).abs() < 1e-9);

@@ -87,10 +87,15 @@ impl Sweep {
         (betas[index / seeds], (index % seeds) as u32 + 1)
     }
 
+    /// What the run with this index starts from.
+    pub fn setup(setup: &Setup, betas: &[f64], seeds: u32, index: usize) -> Setup {
+        let (beta, seed) = Sweep::place(betas, seeds, index);
+        Setup { config: Config { beta, seed, ..setup.config.clone() }, ..setup.clone() }
+    }
+
     /// The setups of all β and seeds.
     pub fn setups(setup: &Setup, betas: &[f64], seeds: u32) -> Vec<Setup> {
-        let with = |(beta, seed)| Setup { config: Config { beta, seed, ..setup.config.clone() }, ..setup.clone() };
-        (0..betas.len() * seeds as usize).map(|index| with(Sweep::place(betas, seeds, index))).collect()
+        (0..betas.len() * seeds as usize).map(|index| Sweep::setup(setup, betas, seeds, index)).collect()
     }
 
     /// β from `first` to `last` in steps of `step`, as `0:1:0.05`, or a list of them, as `0,0.1,0.6`.
@@ -116,7 +121,21 @@ impl Sweep {
             _ => return Err(wrong()),
         };
         let is_good = |beta: &f64| (0.0..=Config::MAX_BETA).contains(beta);
-        if betas.iter().all(is_good) && betas.len() <= 1000 { Ok(betas) } else { Err(wrong()) }
+        if !betas.iter().all(is_good) || betas.len() > 1000 {
+            return Err(wrong());
+        }
+        Sweep::check_betas(&betas).map_err(|error| format!("betas {text}: {error}"))?;
+        Ok(betas)
+    }
+
+    /// Each β once: a run made twice would count as another seed.
+    pub fn check_betas(betas: &[f64]) -> Result<(), String> {
+        let mut sorted = betas.to_vec();
+        sorted.sort_by(f64::total_cmp);
+        match sorted.windows(2).find(|pair| pair[0] == pair[1]) {
+            Some(pair) => Err(format!("β {} stands there twice, expected each once", pair[0])),
+            None => Ok(()),
+        }
     }
 
     /// One point for each β, for one kind of return (its place in [`RETURN_KINDS`]); a β is left out where the return
@@ -166,6 +185,9 @@ mod tests {
         assert_eq!(Sweep::betas("0:1:0.25").unwrap(), [0.0, 0.25, 0.5, 0.75, 1.0]);
         assert_eq!(Sweep::betas("0:0.3:0.1").unwrap(), [0.0, 0.1, 0.2, 0.3]);
         assert_eq!(Sweep::betas("0.6, 0").unwrap(), [0.6, 0.0]);
+        for twice in ["0.6,0,0.6", "0,-0", "0:5e-10:1e-12"] {
+            assert!(Sweep::betas(twice).unwrap_err().contains("stands there twice"), "{twice}");
+        }
         for bad in ["", "0:1", "0:1:0", "1:0:0.1", "0:3:1", "a", "0:1:-1", "NaN", "0:1:1e-9", "0:NaN:1"] {
             assert!(Sweep::betas(bad).unwrap_err().contains("FIRST:LAST:STEP"), "{bad}");
         }

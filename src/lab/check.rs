@@ -7,7 +7,7 @@ use super::{CloneView, Exported, PolicyView, Snapshot, Started};
 use crate::ape::{Config, Contexts};
 use crate::attack::Cloned;
 use crate::experiment::{Attack, Course, CurvePoint, Denied, MethodRun, Outcome, Race, Raced, SweepRun, Task};
-use crate::mdp::{ACTIONS, Grid, KnownReturns, Policy, RETURN_KINDS};
+use crate::mdp::{ACTIONS, Grid, KnownReturns, Policy};
 
 /// Nothing, or a sentence about what is wrong.
 type Checked = Result<(), String>;
@@ -34,9 +34,7 @@ fn within(what: &str, low: f64, high: f64, mut values: impl Iterator<Item = f64>
 }
 
 fn returns(returns: impl Into<KnownReturns>) -> Checked {
-    let returns = returns.into();
-    let figures = (0..RETURN_KINDS.len()).filter_map(|kind| returns.get(kind));
-    finite("a return of", figures.chain([returns.horizon_error, returns.success_error]))
+    returns.into().check()
 }
 
 fn policy(rows: &[[f64; ACTIONS]], grid: &Grid) -> Checked {

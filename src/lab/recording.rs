@@ -55,16 +55,11 @@ impl Recording {
         }
     }
 
-    /// The run after so many updates, or after the last there has been.
-    pub fn at(&self, update: u32, course: &Course) -> Trainer {
+    /// The way to the run after so many updates, or after the last there has been.
+    pub fn search(&self, update: u32) -> Search {
         let update = update.min(self.end);
         let copy = (update / self.spacing) as usize;
-        let mut trainer = self.copies[copy.min(self.copies.len() - 1)].clone();
-        while trainer.updates() < update {
-            advance(&mut trainer, course);
-        }
-        turn(&mut trainer, course);
-        trainer
+        Search { trainer: self.copies[copy.min(self.copies.len() - 1)].clone(), update }
     }
 
     /// Forgets what came after an update.
@@ -76,6 +71,26 @@ impl Recording {
     /// Bytes that the copies take, about.
     pub fn bytes(&self) -> usize {
         self.copies.iter().map(Trainer::bytes).sum()
+    }
+}
+
+/// A moment of a run on its way from the copy before it.
+pub struct Search {
+    pub trainer: Trainer,
+    update: u32,
+}
+
+impl Search {
+    /// Makes an update again, or nothing where the trainer has come to the moment: whether it has.
+    pub fn step(&mut self, course: &Course) -> bool {
+        if self.trainer.updates() < self.update {
+            advance(&mut self.trainer, course);
+        }
+        let has_arrived = self.trainer.updates() == self.update;
+        if has_arrived {
+            turn(&mut self.trainer, course);
+        }
+        has_arrived
     }
 }
 
@@ -124,7 +139,9 @@ mod tests {
                 }
                 assert!(recording.bytes() <= budget.max(3 * trainer.bytes()));
                 for update in [60, 0, 1, 16, 17, 18, 39, 40, 41, 59, 99] {
-                    let then = recording.at(update, &course);
+                    let mut search = recording.search(update);
+                    while !search.step(&course) {}
+                    let then = search.trainer;
                     let expected = digests[update.min(60) as usize];
                     assert_eq!((then.digest(), then.config().beta), expected, "{update} {config:?}");
                 }

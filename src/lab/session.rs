@@ -5,7 +5,7 @@
 
 use std::ops::RangeInclusive;
 
-use super::recording::{Recording, advance};
+use super::recording::{Recording, Search, advance};
 use super::{CloneView, Command, Event, Exported, PolicyView, RunState, Snapshot, Started};
 use crate::ape::{Config, Digest, Ensemble, EnsembleFile, Trainer};
 use crate::attack::{AttackerChoice, Cloned, Target, own_clone};
@@ -79,8 +79,10 @@ pub struct Session {
     next_beta: Option<f64>,
     /// An update of the run to go to.
     seek: Option<u32>,
-    /// Where the run that is being made again was, and whether it played.
-    resuming: Option<(u32, bool)>,
+    /// The way there.
+    search: Option<Search>,
+    /// A run that is being made again.
+    resuming: Option<Resuming>,
     /// What is to be done with it once it is there.
     waiting: Vec<Command>,
     outbox: Vec<Event>,
@@ -97,6 +99,14 @@ pub struct Session {
     allowance: f64,
 }
 
+/// A run that is being made again: where it was.
+struct Resuming {
+    update: u32,
+    is_playing: bool,
+    /// Whether all that had been made is there again.
+    is_complete: bool,
+}
+
 impl Session {
     pub fn new() -> Session {
         Session::default()
@@ -109,11 +119,14 @@ impl Session {
 
     /// Takes a command. What is not possible is refused with a sentence and changes nothing.
     pub fn handle(&mut self, command: Command) {
-        let is_about_run = !matches!(
-            command,
-            Command::Load { .. } | Command::Resume { .. } | Command::Speed(_) | Command::Show(_) | Command::Seen(_)
-        );
-        if self.resuming.is_some() && is_about_run {
+        let waits = match command {
+            Command::Load { .. } | Command::Resume { .. } => false,
+            Command::Speed(_) | Command::Show(_) | Command::Seen(_) => false,
+            // A new run takes the place of the old one, and of all that was to be done with it; but its ensemble is waited for.
+            Command::Retrain { .. } => self.waiting.contains(&Command::Export),
+            _ => true,
+        };
+        if self.resuming.is_some() && waits {
             return self.waiting.push(command);
         }
         if let Err(sentence) = self.carry_out(command) {
@@ -124,7 +137,6 @@ impl Session {
     fn carry_out(&mut self, command: Command) -> Result<(), String> {
         match command {
             Command::Load { setup, play } => {
-                self.next_beta = None;
                 self.begin(*setup, play, false)?;
             }
             Command::Resume { run, setup, recorded, update, is_playing } => {
@@ -133,11 +145,12 @@ impl Session {
                 resumed.is_playing &= recorded > 0;
                 self.put(resumed);
                 self.runs = run;
-                self.resuming = Some((update, is_playing));
+                self.resuming = Some(Resuming { update, is_playing, is_complete: false });
             }
             Command::Retrain { beta } => {
+                let is_resuming = self.resuming.is_some();
                 let run = self.training()?;
-                if run.is_silent && run.is_playing {
+                if run.is_silent && run.is_playing && !is_resuming {
                     self.next_beta = Some(beta);
                 } else {
                     self.retrain(beta)?;
@@ -235,13 +248,26 @@ impl Session {
 
     /// Goes to the update that was asked for.
     fn arrive(&mut self) {
-        let (Some(update), Some(run)) = (self.seek.take(), &mut self.run) else { return };
-        if let Some(recording) = &run.recording {
-            let trainer = recording.at(update, &run.setup.course);
-            run.subject = Subject::Training(Box::new(trainer));
-            (run.is_playing, run.is_silent) = (false, false);
-            self.is_changed = true;
+        self.approach(&|| false);
+    }
+
+    /// Goes towards the update that was asked for, the last one, until time is over: whether it is there.
+    fn approach(&mut self, is_over: &dyn Fn() -> bool) -> bool {
+        let Some(run) = &mut self.run else { return true };
+        if let (Some(update), Some(recording)) = (self.seek.take(), &run.recording) {
+            self.search = Some(recording.search(update));
         }
+        let Some(mut search) = self.search.take() else { return true };
+        while !search.step(&run.setup.course) {
+            if is_over() {
+                self.search = Some(search);
+                return false;
+            }
+        }
+        run.subject = Subject::Training(Box::new(search.trainer));
+        (run.is_playing, run.is_silent) = (false, false);
+        self.is_changed = true;
+        true
     }
 
     /// Goes on with another β: where there is a future already, on a branch beside it.
@@ -294,25 +320,27 @@ impl Session {
 
     fn put(&mut self, run: Run) {
         self.run = Some(run);
-        self.seek = None;
-        self.resuming = None;
+        (self.seek, self.search) = (None, None);
+        (self.resuming, self.next_beta) = (None, None);
         self.waiting.clear();
         self.allowance = 0.0;
         self.is_changed = true;
     }
 
-    /// Where a run that is made again has come as far as it was, it is as it was.
+    /// Where a run that is made again has come as far as it was, it goes back to where it stood; then it is as it was.
     fn finish_resuming(&mut self) {
         let Some(run) = self.run.as_mut().filter(|run| !run.is_playing) else { return };
-        let Some((update, is_playing)) = self.resuming.take() else { return };
-        run.last_update = run.setup.updates();
-        // The page has its curve.
-        run.curve.clear();
-        self.seek = Some(update);
-        self.arrive();
-        if let Some(run) = &mut self.run {
-            run.is_playing = is_playing && run.recording.is_some();
+        let Some(resuming) = &mut self.resuming else { return };
+        if !resuming.is_complete {
+            resuming.is_complete = true;
+            run.last_update = run.setup.updates();
+            // The page has its curve.
+            run.curve.clear();
+            self.seek = Some(resuming.update);
+            return;
         }
+        run.is_playing = resuming.is_playing && run.recording.is_some();
+        self.resuming = None;
         for command in std::mem::take(&mut self.waiting) {
             self.handle(command);
         }
@@ -321,8 +349,10 @@ impl Session {
     /// Trains for a few milliseconds where there is something to train, and makes a snapshot where there is
     /// something new to see. `clock` counts milliseconds from any moment.
     pub fn advance(&mut self, clock: &dyn Fn() -> f64) -> Pace {
-        self.arrive();
         let now = clock();
+        if !self.approach(&|| clock() - now >= STRETCH) {
+            return Pace::Now;
+        }
         let mut pace = self.train(now, clock);
         if self.resuming.is_some() {
             self.finish_resuming();

@@ -157,7 +157,9 @@ pub fn within_horizon(grid: &Grid, policy: &Policy, horizon: u32) -> (f64, f64) 
         std::mem::swap(&mut under_way, &mut next);
     }
     let lost: f64 = under_way.cells().iter().sum();
-    (-steps.iter().sum::<f64>() / grid.free_cells() as f64, 1.0 - lost / grid.starts().len() as f64)
+    // Sums of what leaves a cell may be larger than 1 by a last bit.
+    let success = (1.0 - lost / grid.starts().len() as f64).max(0.0);
+    (-steps.iter().sum::<f64>() / grid.free_cells() as f64, success)
 }
 
 fn add(sums: &mut [f64], more: &[f64]) {

@@ -124,6 +124,28 @@ impl From<Returns> for KnownReturns {
 }
 
 impl KnownReturns {
+    /// Whether these can be the returns of a policy; a sentence says which is not.
+    pub fn check(&self) -> Result<(), String> {
+        // Means may be off by a last bit.
+        const BIT: f64 = 1e-9;
+        let steps = -LONGEST * (1.0 + BIT)..=BIT;
+        let error = 0.0..=LONGEST;
+        let figures = [
+            ("capped_return", self.capped_return, -CAP - BIT..=BIT, "-100 to 0"),
+            ("uncapped_return", self.uncapped_return, steps.clone(), "-1e300 to 0"),
+            ("horizon_return", Some(self.horizon_return), steps, "-1e300 to 0"),
+            ("success", Some(self.success), -BIT..=1.0 + BIT, "0 to 1"),
+            ("horizon_error", Some(self.horizon_error), error.clone(), "0 to 1e300"),
+            ("success_error", Some(self.success_error), error, "0 to 1e300"),
+        ];
+        for (name, value, range, expected) in figures {
+            if let Some(value) = value.filter(|value| !range.contains(value)) {
+                return Err(format!("{name} {value:?}: expected a number from {expected}"));
+            }
+        }
+        Ok(())
+    }
+
     /// The return of this place in [`RETURN_KINDS`], where it is known.
     pub fn get(&self, kind: usize) -> Option<f64> {
         [self.capped_return, self.uncapped_return, Some(self.horizon_return), Some(self.success)][kind]

@@ -5,7 +5,9 @@ use egui::Context;
 use super::app::{App, Promise, TABS, View};
 use super::{lesson, toolbar};
 use crate::attack::AttackerChoice;
-use crate::experiment::address::{AddressError, Pairs, bad, decode, encode, finish, read, read_cell, take, write};
+use crate::experiment::address::{
+    AddressError, Pairs, bad, decode, encode, finish, read, read_cell, shown, take, write,
+};
 use crate::experiment::{PRESETS, Setup};
 use crate::lab::{Command, RunState};
 use crate::mdp::{Grid, RETURN_KINDS};
@@ -122,7 +124,8 @@ impl App {
                     None => {
                         self.load_preset(0);
                         let sentence = format!(
-                            "This link shows the ensemble of {name}, which is not in the link: open the file, or drop it here."
+                            "This link shows the ensemble of {}, which is not in the link: open the file, or drop it here.",
+                            shown(&name)
                         );
                         self.notice = Some(sentence);
                     }
@@ -222,6 +225,9 @@ fn read_promise(pairs: &mut Pairs, setup: &Setup) -> Result<Promise, AddressErro
     let mut promise = Promise { update: None, digest: None };
     if let Some(value) = take(pairs, "at") {
         match value.parse() {
+            _ if setup.ensemble.is_some() => {
+                return bad("at", &value, "none with a given ensemble, which has no updates");
+            }
             Ok(update) if update <= setup.updates() => promise.update = Some(update),
             _ => return bad("at", &value, &format!("an update of the run, 0 to {}", setup.updates())),
         }

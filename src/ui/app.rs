@@ -1,5 +1,7 @@
 //! The page: what it knows, what it hears from the session, and what can be done with it. Where its parts stand is in page.rs.
 
+use std::time::Duration;
+
 use super::board::Shown;
 use super::commands::PaletteWindow;
 use super::compare::Kept;
@@ -103,6 +105,9 @@ pub enum Session {
     Failed(String),
 }
 
+/// How long the session may owe an answer before the visitor is offered another, in seconds.
+const PATIENCE: f64 = 10.0;
+
 /// How often a session that has died is started again by itself: so many times in so many seconds.
 const MOST_RESTARTS: usize = 3;
 const WITHIN: f64 = 60.0;
@@ -113,6 +118,10 @@ pub struct App {
     pub(super) session: Session,
     /// When it was started again by itself.
     restarts: Vec<f64>,
+    /// Whether a run has been asked for of which nothing has been heard.
+    is_asked: bool,
+    /// How long the session has said nothing although it should: seconds of a page that is seen.
+    silence: f64,
     /// Whether the session that has died showed its last run: another can go on with it.
     can_resume: bool,
     /// What the controls say; the session is told of every change.
@@ -184,6 +193,8 @@ impl App {
             link,
             session: Session::Starting,
             restarts: Vec::new(),
+            is_asked: false,
+            silence: 0.0,
             can_resume: false,
             setup: Setup::default(),
             preset: None,
@@ -268,9 +279,9 @@ impl App {
         shown.curve.iter().rfind(|point| point.update <= shown.snapshot.update)?.denied
     }
 
-    /// Whether a run has begun that has not shown anything yet.
+    /// Whether a run is on its way that has not shown anything yet: what is on the page is not what the controls say.
     pub fn is_retraining(&self) -> bool {
-        self.begun.is_some()
+        self.is_asked || self.begun.is_some()
     }
 
     /// Whether there is a session, or one on its way.
@@ -281,6 +292,7 @@ impl App {
     /// Sends a command; while there is no session, none is needed: it will be told everything.
     pub fn send(&mut self, command: Command) {
         if matches!(self.session, Session::Ready) {
+            self.is_asked |= matches!(command, Command::Load { .. } | Command::Retrain { .. });
             self.link.send(&command);
         }
     }
@@ -469,6 +481,7 @@ impl App {
     /// Takes in what the session has said; to be called also while nothing is drawn.
     pub fn hear(&mut self) {
         while let Some(event) = self.link.receive() {
+            self.silence = 0.0;
             match event {
                 Ok(Event::Ready { protocol }) if protocol == PROTOCOL => {
                     self.session = Session::Ready;
@@ -488,7 +501,14 @@ impl App {
                     self.session = Session::Failed(sentence.to_owned());
                 }
                 Ok(Event::Started(started)) => match started.check() {
-                    Ok(_) => self.begun = Some(*started),
+                    Ok(_) => {
+                        self.is_asked &= !self.is_of_controls(&started);
+                        if started.branch_of.is_none() {
+                            // With the run before went what was still wanted of it.
+                            self.wanted.clear();
+                        }
+                        self.begun = Some(*started);
+                    }
                     Err(sentence) => self.distrust(&sentence),
                 },
                 Ok(Event::Snapshot(snapshot)) => match self.check(&snapshot) {
@@ -500,6 +520,7 @@ impl App {
                     Err(sentence) => self.distrust(&sentence),
                 },
                 Ok(Event::Refused(sentence)) => {
+                    self.is_asked = false;
                     self.wanted.clear();
                     self.notice = Some(sentence);
                 }
@@ -523,6 +544,25 @@ impl App {
         }
     }
 
+    /// Takes in the time, and counts how long the session has been silent.
+    pub(super) fn tick(&mut self, ctx: &egui::Context) {
+        let before = std::mem::replace(&mut self.now, ctx.input(|input| input.time));
+        // That a run has begun is said at once, but where another comes to its end before.
+        let is_due = matches!(self.session, Session::Starting) || self.is_asked && self.begun.is_none();
+        if is_due {
+            // A page that nobody sees is not painted, and its worker may rest as well.
+            self.silence += (self.now - before).min(1.0);
+            ctx.request_repaint_after(Duration::from_millis(500));
+        } else {
+            self.silence = 0.0;
+        }
+    }
+
+    /// Whether the session does not answer, though it has neither said nor shown that it is gone.
+    pub(super) fn is_silent(&self) -> bool {
+        self.silence > PATIENCE
+    }
+
     /// What the worker says makes no sense.
     fn distrust(&mut self, why: &str) {
         self.lose_session(format!("The worker has sent what cannot be shown ({why})."));
@@ -543,6 +583,7 @@ impl App {
     fn lose_session(&mut self, sentence: String) {
         let was_at_work = matches!(self.session, Session::Ready);
         self.can_resume = self.begun.take().is_none() && (was_at_work || self.can_resume);
+        self.is_asked = false;
         self.wanted.clear();
         self.restarts.retain(|at| self.now - at < WITHIN);
         if !was_at_work || self.restarts.len() >= MOST_RESTARTS {
@@ -564,6 +605,9 @@ impl App {
 
     pub(super) fn restart_session(&mut self) {
         self.session = Session::Starting;
+        (self.is_asked, self.silence) = (false, 0.0);
+        self.begun = None;
+        self.wanted.clear();
         self.link.restart();
     }
 
@@ -641,18 +685,22 @@ impl App {
         }
     }
 
+    /// Whether a run is the one that the controls ask for.
+    fn is_of_controls(&self, started: &Started) -> bool {
+        (&started.setup.config, &started.setup.grid) == (&self.setup.config, &self.setup.grid)
+    }
+
     /// What follows from a new snapshot: the course of its run, and the moment that the address asks for.
     fn follow(&mut self) {
         let Some(Shown { snapshot, started, .. }) = &self.shown else { return };
         // Unless the controls have gone on to another run.
-        let is_same = (&started.setup.config, &started.setup.grid) == (&self.setup.config, &self.setup.grid);
-        if self.begun.is_none() && is_same {
+        if self.begun.is_none() && self.is_of_controls(started) {
             self.setup.course = snapshot.course.clone();
         }
         if self.view.sought == Some(snapshot.update) {
             self.view.sought = None;
         }
-        let is_resting = matches!(snapshot.state, RunState::Paused | RunState::Finished) && self.begun.is_none();
+        let is_resting = snapshot.state != RunState::Playing && self.begun.is_none();
         if let Some(promise) = self.promise.filter(|_| is_resting) {
             let update = promise.update.unwrap_or(snapshot.last_update);
             if snapshot.update == update {

@@ -148,7 +148,7 @@ impl Line {
         let snapshot = &kept.shown.snapshot;
         let clone = snapshot.clones.first().and_then(|clone| clone.view.returns.get(at));
         let ensemble = (kind.get)(&snapshot.ensemble);
-        let ratio = clone.filter(|_| kind.is_steps).map(|clone| numbers::decimal(clone / ensemble, 1) + "×");
+        let ratio = clone.filter(|_| kind.is_steps).map(|clone| numbers::times(clone, ensemble));
         let dash = || "–".to_owned();
         Line {
             name: kept.name.clone(),

@@ -103,7 +103,7 @@ fn figures(ui: &mut Ui, app: &mut App, columns: usize) {
     let written = |value: Option<f64>| value.map_or("–".to_owned(), |value| numbers::of_kind(kind, value));
     let unit = if kind.is_steps { " steps" } else { "" };
     let ratio = match clone {
-        Some(clone) if kind.is_steps => format!("{}×", numbers::decimal(clone / ensemble, 1)),
+        Some(clone) if kind.is_steps => numbers::times(clone, ensemble),
         _ => "–".to_owned(),
     };
     let shown = [

@@ -1,6 +1,6 @@
 //! What the page asks of its surroundings, a browser or a window.
 
-use egui::DroppedFileHandle;
+use egui::{DroppedFileHandle, ThemePreference};
 
 use crate::ape::EnsembleFile;
 
@@ -54,6 +54,9 @@ pub trait Host {
     fn report(&self, fault: &str) -> String {
         format!("ape-lab {}\n{fault}", env!("CARGO_PKG_VERSION"))
     }
+
+    /// Gives what is around the page the theme that the visitor prefers.
+    fn set_theme(&mut self, _theme: ThemePreference) {}
 
     /// Whether the visitor has asked the system for less motion.
     fn wants_less_motion(&self) -> bool {

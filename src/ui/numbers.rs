@@ -9,6 +9,12 @@ pub fn decimal(value: f64, decimals: usize) -> String {
     if value < 0.0 && !is_zero { format!("−{text}") } else { text }
 }
 
+/// How many times as large one number is as another; a dash where that is no number.
+pub fn times(number: f64, other: f64) -> String {
+    let ratio = number / other;
+    if ratio.is_finite() { decimal(ratio, 1) + "×" } else { "–".to_owned() }
+}
+
 /// Steps or a return, short: one decimal, and powers of ten where it is huge.
 pub fn steps(value: f64) -> String {
     if value.abs() >= f64::from(f32::MAX) {
@@ -78,6 +84,8 @@ mod tests {
     #[test]
     fn numbers_are_written_for_readers() {
         assert_eq!(steps(-16.94), "−16.9");
+        assert_eq!((times(-52.0, -10.0).as_str(), times(-52.0, -1e-320).as_str()), ("5.2×", "–"));
+        assert_eq!((times(-52.0, 0.0).as_str(), times(0.0, 0.0).as_str()), ("–", "–"));
         assert_eq!(steps(-0.01), "0.0");
         assert_eq!(steps(-1.67e9), "−1.7×10⁹");
         assert_eq!([7, 100, 1000, 1_234_567].map(grouped), ["7", "100", "1,000", "1,234,567"]);

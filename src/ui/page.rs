@@ -44,7 +44,7 @@ impl App {
     }
 
     fn draw(&mut self, ui: &mut Ui) {
-        self.now = ui.input(|input| input.time);
+        self.tick(ui.ctx());
         for file in ui.input(|input| input.raw.dropped_files.clone()) {
             self.host.read(file);
         }
@@ -202,6 +202,12 @@ impl App {
                 Some(0) => self.restart_session(),
                 Some(_) => ui.ctx().copy_text(self.host.report(&report)),
                 None => {}
+            }
+        }
+        if self.is_silent() {
+            let sentence = "The worker does not answer. It may still be on its way; another can take its place.";
+            if message(ui, sentence, &["Restart the worker"]).is_some() {
+                self.restart_session();
             }
         }
         if let Some(sentence) = self.notice.clone()

@@ -81,11 +81,13 @@ impl App {
 
     pub(super) fn apply_preferences(&mut self, ctx: &Context) {
         self.view.color_map = self.preferences.color_map;
-        ctx.set_theme(match self.preferences.theme {
+        let theme = match self.preferences.theme {
             Theme::System => ThemePreference::System,
             Theme::Light => ThemePreference::Light,
             Theme::Dark => ThemePreference::Dark,
-        });
+        };
+        ctx.set_theme(theme);
+        self.host.set_theme(theme);
         ctx.set_zoom_factor(self.preferences.text_size);
         theme::set_motion(ctx, self.preferences.motion == Motion::System && !self.host.wants_less_motion());
     }

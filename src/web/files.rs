@@ -5,7 +5,7 @@ use std::cell::RefCell;
 use std::collections::VecDeque;
 use std::rc::Rc;
 
-use egui::DroppedFileHandle;
+use egui::{DroppedFileHandle, ThemePreference};
 use js_sys::{Array, Promise};
 use wasm_bindgen::prelude::*;
 use wasm_bindgen_futures::{JsFuture, spawn_local};
@@ -118,6 +118,16 @@ impl Host for Files {
 
     fn report(&self, fault: &str) -> String {
         super::faults::report(fault)
+    }
+
+    fn set_theme(&mut self, theme: ThemePreference) {
+        let Some(root) = web_sys::window().and_then(|window| window.document()?.document_element()) else { return };
+        // The style sheet knows these names (web/page.css); without one it goes by the system.
+        let _ = match theme {
+            ThemePreference::System => root.remove_attribute("data-theme"),
+            ThemePreference::Light => root.set_attribute("data-theme", "light"),
+            ThemePreference::Dark => root.set_attribute("data-theme", "dark"),
+        };
     }
 
     fn wants_less_motion(&self) -> bool {

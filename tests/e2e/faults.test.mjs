@@ -423,6 +423,21 @@ for (const [how, answer] of Object.entries(BROKEN)) {
   });
 }
 
+test("a worker that never comes can be replaced, and is not waited for in silence", async () => {
+  // Its program is asked for and the first time not answered: nothing has failed.
+  let asked = 0;
+  const before = (page) => page.route("**/worker_bg.wasm", (route) => (asked++ === 0 ? null : route.continue()));
+  const { page, problems, close } = await open(browser, site.address, { before });
+  await alert(page, "The worker does not answer").waitFor(PATIENCE);
+  await page.screenshot({ path: SHOTS + "worker-silent-1280x800-light.png" });
+  await click(page, "button", "Restart the worker");
+  await trained(page);
+  assert.equal(await page.getByRole("alert").count(), 0);
+  assert.equal(asked, 2);
+  assert.deepEqual(problems, []);
+  await close();
+});
+
 test("programs of the wrong type work all the same", async () => {
   const before = (page) =>
     page.route("**/*.wasm", async (route) => route.fulfill({ contentType: "application/octet-stream", body: await program(route) }));
@@ -550,7 +565,11 @@ test("of a thousand quick moves of β the last one counts, and nothing piles up"
 const breakClock = (page, how) =>
   page.evaluate((how) => {
     const clock = performance;
-    const isAskedByProgram = () => new Error().stack.includes(".wasm");
+    const isAskedByProgram = () => {
+      const [above, ...below] = new Error().stack.split(".wasm");
+      // Not what the program asks of the page's own scripts, which ask the browser.
+      return below.length > 0 && !/\/rest[-.]/.test(above);
+    };
     if (how === "a panic") {
       Object.defineProperty(window, "performance", { get: () => (isAskedByProgram() ? undefined : clock), configurable: true });
     } else {
@@ -602,6 +621,30 @@ for (const [how, sentence] of [
     await close();
   });
 }
+
+test("what is said of a crash has the theme that was chosen, not that of the system", async () => {
+  const { page, close } = await open(browser, site.address, { colorScheme: "light" });
+  await trained(page);
+  const ground = () => message(page).evaluate((element) => getComputedStyle(element).backgroundColor);
+  for (const [theme, color] of [["dark", "rgb(21, 23, 28)"], ["light", "rgb(247, 247, 245)"], ["system", "rgb(247, 247, 245)"]]) {
+    await click(page, "button", "Settings");
+    await widget(page, "radio", `Theme: ${theme}`).waitFor(PATIENCE);
+    await click(page, "radio", `Theme: ${theme}`);
+    await until(ground, (now) => now === color);
+    await press(page, "Escape");
+    await widget(page, "radio", `Theme: ${theme}`).waitFor({ state: "detached", ...PATIENCE });
+  }
+  await page.emulateMedia({ colorScheme: "dark" });
+  await until(ground, (now) => now === "rgb(21, 23, 28)");
+  await page.evaluate(() => localStorage.setItem("ape-lab.preferences", JSON.stringify({ theme: "Light" })));
+  await page.reload();
+  await trained(page);
+  await breakClock(page, "a panic");
+  await alert(page, "ape-lab has stopped").waitFor(PATIENCE);
+  assert.equal(await ground(), "rgb(247, 247, 245)");
+  assert.match(await message(page).locator("pre").textContent(), /^Window: .*, light$/m);
+  await close();
+});
 
 test("errors of others, and hints of the browser's, leave the page alone", async () => {
   const { page, close } = await open(browser, site.address);

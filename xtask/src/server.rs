@@ -3,9 +3,14 @@
 
 use std::net::Ipv4Addr;
 use std::path::{Component, Path, PathBuf};
+use std::sync::Arc;
 
+use axum::Router;
+use axum::http::header::{ALLOW, CACHE_CONTROL, CONTENT_TYPE, HeaderName, HeaderValue, LOCATION};
+use axum::http::{Method, StatusCode, Uri};
+use axum::response::{IntoResponse, Response};
 use percent_encoding::{NON_ALPHANUMERIC, percent_decode_str, utf8_percent_encode};
-use tiny_http::{Header, Method, Request, Response, ResponseBox, Server};
+use tokio::net::TcpListener;
 
 use crate::Failure;
 use crate::offline::HEADERS;
@@ -25,7 +30,7 @@ const TYPES: [(&str, &str); 7] = [
 /// A folder of files, and what is said with each of them.
 pub struct Site {
     folder: PathBuf,
-    headers: Vec<Header>,
+    headers: Vec<(HeaderName, HeaderValue)>,
 }
 
 /// What is at an address.
@@ -44,55 +49,51 @@ impl Site {
         // Below a line with addresses, here all of them, each header has an indented line.
         let lines = text.lines().filter(|line| line.starts_with(' '));
         let mut headers = lines
-            .map(|line| line.trim().parse().map_err(|()| format!("{HEADERS}: no header: {}", line.trim())))
-            .collect::<Result<Vec<Header>, Failure>>()?;
+            .map(|line| header(line.trim()).ok_or_else(|| format!("{HEADERS}: no header: {}", line.trim())))
+            .collect::<Result<Vec<_>, Failure>>()?;
         // A page that was built again is a new page.
-        headers.push(header("Cache-Control", "no-cache"));
+        headers.push((CACHE_CONTROL, HeaderValue::from_static("no-cache")));
         Ok(Site { folder, headers })
     }
 
     /// Answers at this port of 127.0.0.1 until the program is ended.
-    pub fn serve(&self, port: u16) -> Result<(), Failure> {
-        let server = Server::http((Ipv4Addr::LOCALHOST, port)).map_err(|error| format!("port {port}: {error}"))?;
-        println!("\n  ape-lab is at http://127.0.0.1:{port}/ (Ctrl-C stops it)\n");
-        self.answer_all(&server);
-        Ok(())
+    pub fn serve(self, port: u16) -> Result<(), Failure> {
+        let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build();
+        let failed = |error| format!("port {port}: {error}");
+        runtime.map_err(failed)?.block_on(async {
+            let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port)).await.map_err(failed)?;
+            println!("\n  ape-lab is at http://127.0.0.1:{port}/ (Ctrl-C stops it)\n");
+            self.answer_all(listener).await.map_err(failed)
+        })
     }
 
-    /// Several at a time, as a browser asks.
-    fn answer_all(&self, server: &Server) {
-        std::thread::scope(|scope| {
-            for _ in 0..4 {
-                scope.spawn(|| {
-                    while let Ok(request) = server.recv() {
-                        let response = self.answer(&request);
-                        // Whoever has gone away needs no answer.
-                        let _ = request.respond(response);
-                    }
-                });
+    async fn answer_all(self, listener: TcpListener) -> std::io::Result<()> {
+        let site = Arc::new(self);
+        let answer = async move |method, uri: Uri| site.answer(&method, uri.path());
+        axum::serve(listener, Router::new().fallback(answer)).await
+    }
+
+    fn answer(&self, method: &Method, path: &str) -> Response {
+        let missing = || (StatusCode::NOT_FOUND, "There is no such file.").into_response();
+        let is_read = [Method::GET, Method::HEAD].contains(method);
+        let mut response = match self.find(path) {
+            _ if !is_read => {
+                (StatusCode::METHOD_NOT_ALLOWED, [(ALLOW, "GET, HEAD")], "Files can only be read.").into_response()
             }
-        });
-    }
-
-    fn answer(&self, request: &Request) -> ResponseBox {
-        let response = match (request.method(), self.find(request.url())) {
-            (Method::Get | Method::Head, Found::File(file)) => match std::fs::read(&file) {
-                Ok(bytes) => Response::from_data(bytes).with_header(header("Content-Type", media_type(&file))).boxed(),
-                Err(_) => status(404, "There is no such file."),
+            Found::File(file) => match std::fs::read(&file) {
+                Ok(bytes) => ([(CONTENT_TYPE, media_type(&file))], bytes).into_response(),
+                Err(_) => missing(),
             },
-            (Method::Get | Method::Head, Found::Moved(place)) => {
-                status(308, "This is a folder.").with_header(header("Location", &place))
+            Found::Moved(place) => {
+                (StatusCode::PERMANENT_REDIRECT, [(LOCATION, place)], "This is a folder.").into_response()
             }
-            (Method::Get | Method::Head, Found::Nothing) => status(404, "There is no such file."),
-            _ => status(405, "Files can only be read.").with_header(header("Allow", "GET, HEAD")),
+            Found::Nothing => missing(),
         };
-        // With its length, however long.
-        let response = response.with_chunked_threshold(usize::MAX);
-        self.headers.iter().cloned().fold(response, Response::with_header)
+        response.headers_mut().extend(self.headers.iter().cloned());
+        response
     }
 
-    fn find(&self, address: &str) -> Found {
-        let path = address.split(['?', '#']).next().unwrap_or_default();
+    fn find(&self, path: &str) -> Found {
         let Ok(decoded) = percent_decode_str(path).decode_utf8() else { return Found::Nothing };
         let Some(mut file) = self.inside(Path::new(decoded.trim_start_matches('/'))) else { return Found::Nothing };
         if file.is_dir() {
@@ -120,8 +121,10 @@ impl Site {
     }
 }
 
-fn header(name: &str, value: &str) -> Header {
-    Header::from_bytes(name, value).expect("our headers are plain text")
+/// `Name: value`.
+fn header(line: &str) -> Option<(HeaderName, HeaderValue)> {
+    let (name, value) = line.split_once(':')?;
+    Some((name.parse().ok()?, value.trim_start().parse().ok()?))
 }
 
 fn media_type(file: &Path) -> &'static str {
@@ -129,23 +132,20 @@ fn media_type(file: &Path) -> &'static str {
     TYPES.iter().find(|(known, _)| *known == extension).map_or("application/octet-stream", |(_, media)| media)
 }
 
-fn status(code: u16, sentence: &str) -> ResponseBox {
-    Response::from_string(sentence).with_status_code(code).boxed()
-}
-
 #[cfg(test)]
 mod tests {
     use std::io::{Read, Write};
     use std::net::{Ipv4Addr, TcpStream};
+    use std::time::Duration;
 
-    use tiny_http::Server;
+    use tokio::net::TcpListener;
 
     use super::Site;
 
-    /// Sends requests as they are, which no browser would, and returns the answers: status line and headers, and body.
-    fn answers(requests: &[&str]) -> Vec<(String, String)> {
-        let outside = std::env::temp_dir().join(format!("ape-lab-server-{}", std::process::id()));
-        let folder = outside.join("dist");
+    /// A folder with a page, and a file beside it that is nobody's business.
+    fn folder() -> tempfile::TempDir {
+        let outside = tempfile::tempdir().unwrap();
+        let folder = outside.path().join("dist");
         std::fs::create_dir_all(folder.join("some/deep")).unwrap();
         let files = [
             ("../secret", "secret"),
@@ -162,32 +162,63 @@ mod tests {
             std::fs::write(folder.join(name), text).unwrap();
         }
         #[cfg(unix)]
-        {
-            let _ = std::fs::remove_file(folder.join("link"));
-            std::os::unix::fs::symlink("../secret", folder.join("link")).unwrap();
-        }
-        let site = Site::open(&folder).unwrap();
-        let server = Server::http((Ipv4Addr::LOCALHOST, 0)).unwrap();
-        let port = server.server_addr().to_ip().unwrap().port();
-        let ask = |request: &&str| {
-            let mut stream = TcpStream::connect((Ipv4Addr::LOCALHOST, port)).unwrap();
-            write!(stream, "{request} HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n").unwrap();
-            let mut answer = String::new();
-            stream.read_to_string(&mut answer).unwrap();
-            let (head, body) = answer.split_once("\r\n\r\n").unwrap();
-            (head.to_owned(), body.to_owned())
-        };
-        let answers = std::thread::scope(|scope| {
-            scope.spawn(|| site.answer_all(&server));
-            let answers = requests.iter().map(ask).collect();
-            (0..4).for_each(|_| server.unblock());
-            answers
-        });
-        std::fs::remove_dir_all(outside).unwrap();
-        answers
+        std::os::unix::fs::symlink("../secret", folder.join("link")).unwrap();
+        outside
     }
 
-    /// All in one test: the folder is one.
+    /// What `ask` finds out at the port where the page is served meanwhile.
+    fn served<T: Send + 'static>(ask: impl FnOnce(u16) -> T + Send + 'static) -> T {
+        let folder = folder();
+        let site = Site::open(&folder.path().join("dist")).unwrap();
+        let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
+        runtime.block_on(async {
+            let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).await.unwrap();
+            let port = listener.local_addr().unwrap().port();
+            tokio::spawn(site.answer_all(listener));
+            tokio::task::spawn_blocking(move || ask(port)).await.unwrap()
+        })
+    }
+
+    /// Sends a request as it is, which no browser would; what becomes of the connection afterwards is asked for.
+    fn send(port: u16, request: &str, connection: &str) -> TcpStream {
+        let mut stream = TcpStream::connect((Ipv4Addr::LOCALHOST, port)).unwrap();
+        write!(stream, "{request} HTTP/1.1\r\nHost: localhost\r\nConnection: {connection}\r\n\r\n").unwrap();
+        stream
+    }
+
+    /// Status line and headers, and body.
+    fn answers(requests: &[&'static str]) -> Vec<(String, String)> {
+        let requests = requests.to_vec();
+        served(move |port| {
+            let ask = |request| {
+                let mut answer = String::new();
+                send(port, request, "close").read_to_string(&mut answer).unwrap();
+                let (head, body) = answer.split_once("\r\n\r\n").unwrap();
+                (head.to_owned(), body.to_owned())
+            };
+            requests.into_iter().map(ask).collect()
+        })
+    }
+
+    /// Browsers keep several connections open, and open some before they know what for.
+    #[test]
+    fn every_connection_is_answered_while_others_stay_open() {
+        let begins = served(|port| {
+            let _silent: Vec<_> = (0..8).map(|_| TcpStream::connect((Ipv4Addr::LOCALHOST, port)).unwrap()).collect();
+            let mut open: Vec<_> = (0..32).map(|_| send(port, "GET /some/program.wasm", "keep-alive")).collect();
+            let begin = |stream: &mut TcpStream| {
+                // An end to the test, should there be no answer.
+                stream.set_read_timeout(Some(Duration::from_secs(20))).unwrap();
+                let mut begin = [0; 12];
+                stream.read_exact(&mut begin).map(|()| begin)
+            };
+            open.iter_mut().map(begin).collect::<Vec<_>>()
+        });
+        for (connection, begin) in begins.into_iter().enumerate() {
+            assert_eq!(begin.ok().as_ref(), Some(b"HTTP/1.1 200"), "connection {connection}");
+        }
+    }
+
     #[test]
     fn files_are_served_as_by_a_host_and_nothing_else_is() {
         let good = [
@@ -226,22 +257,22 @@ mod tests {
         let answers = answers(&requests);
         for (request, (head, body)) in requests.iter().zip(&answers) {
             assert!(!body.contains("secret") && !body.contains("root:"), "{request}: {body}");
-            assert!(head.contains("\r\nX-Content-Type-Options: nosniff"), "{request}: {head}");
+            assert!(head.contains("\r\nx-content-type-options: nosniff"), "{request}: {head}");
         }
         for ((request, media, text), (head, body)) in good.iter().zip(&answers) {
             assert!(head.starts_with("HTTP/1.1 200"), "{request}: {head}");
-            assert!(head.contains(&format!("Content-Type: {media}")), "{request}: {head}");
+            assert!(head.contains(&format!("content-type: {media}")), "{request}: {head}");
             assert_eq!(body, text, "{request}");
         }
-        assert!(answers[good.len() - 1].0.contains("Content-Length: 7"));
+        assert!(answers[good.len() - 1].0.contains("content-length: 7"));
         let (missing_answers, other_answers) = answers[good.len()..].split_at(missing.len());
         for (request, (head, _)) in missing.iter().zip(missing_answers) {
             assert!(head.starts_with("HTTP/1.1 404"), "{request}: {head}");
         }
-        assert!(other_answers[0].0.starts_with("HTTP/1.1 308") && other_answers[0].0.contains("Location: deep/"));
-        assert!(other_answers[1].0.contains("Location: some/"));
+        assert!(other_answers[0].0.starts_with("HTTP/1.1 308") && other_answers[0].0.contains("location: deep/"));
+        assert!(other_answers[1].0.contains("location: some/"));
         for (head, _) in &other_answers[2..] {
-            assert!(head.starts_with("HTTP/1.1 405") && head.contains("Allow: GET, HEAD"), "{head}");
+            assert!(head.starts_with("HTTP/1.1 405") && head.contains("allow: GET, HEAD"), "{head}");
         }
     }
 }

@@ -1,7 +1,7 @@
 //! The experiments as commands: `attack`, `table1`, `sweep`, `results`. Tasks run on all cores; how many there are
 //! does not change the outcome.
 
-use std::io::{IsTerminal, Write};
+use std::io::IsTerminal;
 use std::path::Path;
 use std::sync::Mutex;
 use std::time::Instant;
@@ -27,14 +27,22 @@ pub fn commands() -> [Command; 5] {
     let json = || Arg::new("json").long("json").action(ArgAction::SetTrue).help("Print JSON");
     let out = |help: &'static str| Arg::new("out").short('o').long("out").value_name("FILE").help(help);
     let seeds = |default: &'static str| {
-        Arg::new("seeds").long("seeds").value_name("N").default_value(default).help("Number of seeds, from 1 on")
+        let arg = Arg::new("seeds").long("seeds").value_name("N").default_value(default).allow_hyphen_values(true);
+        arg.help("Number of seeds, from 1 on")
     };
     [
         Command::new("attack")
             .about("Every cloner against an ensemble file")
             .arg(Arg::new("file").value_name("FILE").required(true))
             .arg(attackers())
-            .arg(Arg::new("seed").long("seed").value_name("N").default_value("1").help("Seed of the attacks"))
+            .arg(
+                Arg::new("seed")
+                    .long("seed")
+                    .value_name("N")
+                    .default_value("1")
+                    .allow_hyphen_values(true)
+                    .help("Seed of the attacks"),
+            )
             .arg(json())
             .arg(out("Write the table to this CSV file")),
         with_setup(
@@ -51,6 +59,7 @@ pub fn commands() -> [Command; 5] {
                     .long("betas")
                     .value_name("LIST")
                     .default_value("0:1:0.05")
+                    .allow_hyphen_values(true)
                     .help("FIRST:LAST:STEP, or a list with commas"),
             )
             .arg(seeds("3"))
@@ -79,18 +88,20 @@ pub fn commands() -> [Command; 5] {
 
 /// Runs tasks on all cores; outcomes come in the order of the tasks. Says on a terminal how far it is.
 pub fn run_all(tasks: &[Task]) -> Result<Vec<Outcome>, String> {
-    run_each(tasks, &|_, outcome| Ok(outcome))
+    run_each(tasks.len(), &|index| tasks[index].clone(), &|_, outcome| Ok(outcome))
 }
 
-/// The same; `keep` takes each outcome as it comes, with the place of its task, and what it makes of it is returned.
+/// Runs so many tasks, each made when its turn has come; `keep` takes each outcome as it comes, with the index of its
+/// task, and what it makes of it is returned.
 pub fn run_each<T: Send>(
-    tasks: &[Task],
+    tasks: usize,
+    task: &(impl Fn(usize) -> Task + Sync),
     keep: &(impl Fn(usize, Outcome) -> Result<T, String> + Sync),
 ) -> Result<Vec<T>, String> {
     let begin = Instant::now();
     let clock = || begin.elapsed().as_secs_f64() * 1000.0;
     let is_shown = std::io::stderr().is_terminal();
-    let done = Mutex::new((vec![0.0; tasks.len()], begin));
+    let done = Mutex::new((vec![0.0; tasks], begin));
     let show = |index: usize, part: f64| {
         let Ok(mut done) = done.lock() else { return };
         done.0[index] = part;
@@ -98,23 +109,22 @@ pub fn run_each<T: Send>(
             return;
         }
         done.1 = Instant::now();
-        let share = done.0.iter().sum::<f64>() / tasks.len() as f64;
+        let share = done.0.iter().sum::<f64>() / tasks as f64;
         let left = begin.elapsed().as_secs_f64() * (1.0 / share.max(1e-3) - 1.0);
-        eprint!("\r{:3.0} % done, about {left:.0} s left   ", 100.0 * share);
-        let _ = std::io::stderr().flush();
+        mutter!("\r{:3.0} % done, about {left:.0} s left   ", 100.0 * share);
     };
-    let run = |(index, task): (usize, &Task)| {
+    let run = |index: usize| {
         let mut progress = |part| {
             show(index, part);
             true
         };
-        let outcome = task.run(&clock, &mut progress)?;
+        let outcome = task(index).run(&clock, &mut progress)?;
         show(index, 1.0);
         keep(index, outcome.ok_or_else(|| "stopped".to_owned())?)
     };
-    let outcomes = tasks.par_iter().enumerate().map(run).collect();
+    let outcomes = (0..tasks).into_par_iter().map(run).collect();
     if is_shown {
-        eprint!("\r{:40}\r", "");
+        mutter!("\r{:40}\r", "");
     }
     outcomes
 }
@@ -125,9 +135,15 @@ fn number(matches: &ArgMatches, name: &str, low: u32, high: u32) -> Result<u32, 
     number.ok_or_else(|| format!("--{name} {text}: must be a whole number from {low} to {high}"))
 }
 
+/// Each has the ensemble for itself.
+const MOST_ATTACKERS: usize = 100;
+
 fn attackers(matches: &ArgMatches) -> Result<Vec<AttackerChoice>, String> {
     match matches.get_one::<String>("attackers").expect("it has a default").as_str() {
         "all" => Ok(AttackerChoice::usual()),
+        list if list.split(',').count() > MOST_ATTACKERS => {
+            Err(format!("--attackers: {} of them, expected at most {MOST_ATTACKERS}", list.split(',').count()))
+        }
         list => list
             .split(',')
             .map(|name| name.trim().parse().map_err(|error| format!("--attackers: {error}; or all")))
@@ -136,7 +152,7 @@ fn attackers(matches: &ArgMatches) -> Result<Vec<AttackerChoice>, String> {
 }
 
 pub fn attack(matches: &ArgMatches) -> Result<(), String> {
-    check_out(matches, "out")?;
+    check_out(matches, &["out"])?;
     let Opened { grid, ensemble, horizon, digest } = ensemble_file(matches)?;
     let seed = number(matches, "seed", 0, u32::MAX)?;
     let file = Box::new(EnsembleFile::new(&grid, &ensemble, None));
@@ -210,7 +226,7 @@ pub fn make_table1(setup: &Setup, seeds: u32, attackers: Vec<AttackerChoice>) ->
 }
 
 pub fn table1(matches: &ArgMatches) -> Result<(), String> {
-    check_out(matches, "out")?;
+    check_out(matches, &["out"])?;
     let setup = setup(matches)?;
     let table = make_table1(&setup, number(matches, "seeds", 1, 1000)?, attackers(matches)?)?;
     if let Some(file) = matches.get_one::<String>("out") {
@@ -258,17 +274,16 @@ fn shown(summary: &Summary) -> String {
 
 /// The sweep of a setup.
 pub fn make_sweep(setup: &Setup, betas: &[f64], seeds: u32) -> Result<Sweep, String> {
-    let tasks: Vec<Task> =
-        Sweep::setups(setup, betas, seeds).into_iter().map(|setup| Task::Sweep { setup: Box::new(setup) }).collect();
-    let runs = run_all(&tasks)?.into_iter().filter_map(|outcome| match outcome {
-        Outcome::Sweep(run) => Some(run),
-        _ => None,
-    });
-    Ok(Sweep { runs: runs.collect() })
+    let task = |index| Task::Sweep { setup: Box::new(Sweep::setup(setup, betas, seeds, index)) };
+    let run = |_, outcome| match outcome {
+        Outcome::Sweep(run) => Ok(run),
+        _ => Err("an outcome of another kind of task".to_owned()),
+    };
+    Ok(Sweep { runs: run_each(betas.len() * seeds as usize, &task, &run)? })
 }
 
 pub fn sweep(matches: &ArgMatches) -> Result<(), String> {
-    check_out(matches, "out")?;
+    check_out(matches, &["out"])?;
     let betas = matches.get_one::<String>("betas").expect("it has a default");
     let betas = Sweep::betas(betas).map_err(|error| format!("--{error}"))?;
     let (setup, seeds) = (setup(matches)?, number(matches, "seeds", 1, 1000)?);
@@ -306,4 +321,33 @@ pub fn results(matches: &ArgMatches) -> Result<(), String> {
         say!("{}: {} bytes", path.display(), text.len());
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::atomic::{AtomicUsize, Ordering};
+
+    use ape_lab::ape::Config;
+
+    use super::*;
+
+    /// A sweep may have a million runs: no more of them stand ready than are being made.
+    #[test]
+    fn a_task_is_made_when_its_turn_has_come() {
+        let config = Config { batch_steps: 1, total_steps: 1, horizon: 1, ..Config::default() };
+        let setup = Setup { config, ..Setup::default() };
+        let (made, kept, most) = (AtomicUsize::new(0), AtomicUsize::new(0), AtomicUsize::new(0));
+        let task = |_| {
+            let made = made.fetch_add(1, Ordering::SeqCst) + 1;
+            most.fetch_max(made - kept.load(Ordering::SeqCst), Ordering::SeqCst);
+            Task::Sweep { setup: Box::new(setup.clone()) }
+        };
+        let keep = |_, _| {
+            kept.fetch_add(1, Ordering::SeqCst);
+            Ok(())
+        };
+        assert_eq!(run_each(1000, &task, &keep).unwrap().len(), 1000);
+        let at_once = most.into_inner();
+        assert!(at_once <= rayon::current_num_threads(), "{at_once}");
+    }
 }

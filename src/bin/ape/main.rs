@@ -5,7 +5,12 @@
 
 /// Prints a line on standard output.
 macro_rules! say {
-    ($($text:tt)*) => { $crate::print_line(format_args!($($text)*)) };
+    ($($text:tt)*) => { $crate::print_text(format_args!("{}\n", format_args!($($text)*))) };
+}
+
+/// Says something on standard error; where nobody can hear it, that is no failure.
+macro_rules! mutter {
+    ($($text:tt)*) => { _ = std::io::Write::write_fmt(&mut std::io::stderr(), format_args!($($text)*)) };
 }
 
 mod experiments;
@@ -18,6 +23,7 @@ use std::process::ExitCode;
 
 use ape_lab::ape::{Digest, Ensemble, EnsembleFile, FIELDS, Field, Figures, Trainer};
 use ape_lab::experiment::{CurvePoint, Denied, PRESETS, Preset, Setup};
+use ape_lab::files;
 use ape_lab::mdp::{Grid, HORIZON, KnownReturns, transition_model};
 use clap::{Arg, ArgMatches, Command};
 use serde::Serialize;
@@ -26,7 +32,7 @@ fn main() -> ExitCode {
     let matches = match command().try_get_matches() {
         Ok(matches) => matches,
         Err(error) if !error.use_stderr() => {
-            print!("{error}");
+            print_text(format_args!("{error}"));
             return ExitCode::SUCCESS;
         }
         Err(error) => return fail(&usage_sentence(&error)),
@@ -49,8 +55,23 @@ fn main() -> ExitCode {
 }
 
 fn fail(sentence: &str) -> ExitCode {
-    eprintln!("ape: {}", sentence.replace('\n', " "));
+    mutter!("ape: {}\n", in_a_line(sentence));
     ExitCode::from(2)
+}
+
+/// A sentence in one line of a length that is read; what it quotes of a file does nothing to a terminal.
+fn in_a_line(sentence: &str) -> String {
+    const MOST: usize = 2000;
+    let mut line = String::new();
+    for (at, letter) in sentence.chars().enumerate() {
+        match letter {
+            _ if at == MOST => return line + "…",
+            '\n' => line.push(' '),
+            letter if letter.is_control() => line.extend(letter.escape_default()),
+            letter => line.push(letter),
+        }
+    }
+    line
 }
 
 /// The first paragraph of clap's error, in one line.
@@ -116,44 +137,55 @@ fn read(file: &str, longest: usize) -> Result<String, String> {
         return Err(long(length));
     }
     // A device does not tell its length.
-    let mut text = String::new();
-    let read = opened.take(longest + 1).read_to_string(&mut text).map_err(sentence)? as u64;
-    if read > longest { Err(long(read)) } else { Ok(text) }
+    let mut bytes = Vec::new();
+    let read = opened.take(longest + 1).read_to_end(&mut bytes).map_err(sentence)? as u64;
+    if read > longest {
+        return Err(long(read));
+    }
+    let text = String::from_utf8(bytes).map_err(|_| format!("{file}: expected a text in UTF-8"))?;
+    // Some editors begin a file with a mark of its encoding.
+    Ok(text.strip_prefix('\u{feff}').map(str::to_owned).unwrap_or(text))
 }
 
 /// Writes a file whole or not at all, whoever else may be writing it.
 fn write(file: &str, text: &str) -> Result<(), String> {
-    let part = Path::new(file).with_added_extension(format!("{}.part", std::process::id()));
-    let write_part = || {
-        let mut opened = File::create(&part)?;
-        opened.write_all(text.as_bytes())?;
-        // The name is to be taken by a file that is on the disk.
-        opened.sync_all()?;
-        std::fs::rename(&part, file)
+    files::write(file.as_ref(), text).map_err(|error| format!("{file}: {error}"))
+}
+
+/// Prints on standard output. Who reads it may have read enough and gone, which is no failure; anything else is.
+fn print_text(text: std::fmt::Arguments) {
+    let mut out = std::io::stdout().lock();
+    match out.write_fmt(text).and_then(|()| out.flush()) {
+        Ok(()) => {}
+        Err(error) if error.kind() == std::io::ErrorKind::BrokenPipe => std::process::exit(0),
+        Err(error) => {
+            mutter!("ape: standard output: {error}\n");
+            std::process::exit(2);
+        }
+    }
+}
+
+/// Whether the files that flags name can be written to, before anything is computed for them: none of them twice, nor in
+/// the place of one that is read.
+fn check_out(matches: &ArgMatches, flags: &[&str]) -> Result<(), String> {
+    // A command without one of the arguments has nothing to be compared.
+    let given = |name: &str| matches.try_get_many::<String>(name).ok().flatten().into_iter().flatten();
+    let same = |one: &str, other: &str| match (Path::new(one).canonicalize(), Path::new(other).canonicalize()) {
+        // A device takes any number of texts.
+        (Ok(one), Ok(other)) => one == other && one.is_file(),
+        _ => std::path::absolute(one).ok() == std::path::absolute(other).ok(),
     };
-    write_part().map_err(|error| {
-        // What could not be renamed is of no use to anyone.
-        let _ = std::fs::remove_file(&part);
-        format!("{file}: {error}")
-    })
-}
-
-/// Prints a line; who reads it may have read enough and gone, which is no failure.
-fn print_line(line: std::fmt::Arguments) {
-    if writeln!(std::io::stdout().lock(), "{line}").is_err() {
-        std::process::exit(0);
+    let mut taken: Vec<&String> = ["file", "files", "config"].into_iter().flat_map(given).collect();
+    for flag in flags {
+        for file in given(flag) {
+            files::check(file.as_ref()).map_err(|error| format!("--{flag} {file}: {error}"))?;
+            if let Some(other) = taken.iter().find(|other| same(other, file)) {
+                return Err(format!("--{flag} {file}: is {other}, which is another file of this command"));
+            }
+            taken.push(file);
+        }
     }
-}
-
-/// Whether the file that a flag names can be written to, before anything is computed for it.
-fn check_out(matches: &ArgMatches, flag: &str) -> Result<(), String> {
-    let Some(file) = matches.get_one::<String>(flag) else { return Ok(()) };
-    let folder = Path::new(file).parent().filter(|folder| !folder.as_os_str().is_empty());
-    match folder {
-        _ if Path::new(file).is_dir() => Err(format!("--{flag} {file}: is a folder, expected a file")),
-        Some(folder) if !folder.is_dir() => Err(format!("--{flag} {file}: there is no folder {}", folder.display())),
-        _ => Ok(()),
-    }
+    Ok(())
 }
 
 fn print(result: &impl Serialize) -> Result<(), String> {
@@ -179,7 +211,8 @@ fn ensemble_file(matches: &ArgMatches) -> Result<Opened, String> {
         EnsembleFile::parse(&read(file, EnsembleFile::LONGEST)?).map_err(|error| in_file(error.to_string()))?;
     let horizon = parsed.config.as_ref().map_or(HORIZON, |config| config.horizon);
     if let Some(reason) = &parsed.left_out {
-        eprintln!("ape: {file}: its config is not ours and left out, T is {HORIZON} ({reason})");
+        let sentence = format!("{file}: its config is not ours and left out, T is {HORIZON} ({reason})");
+        mutter!("ape: {}\n", in_a_line(&sentence));
     }
     let digest = parsed.digest;
     let (grid, ensemble) = parsed.check().map_err(|error| in_file(error.to_string()))?;
@@ -199,7 +232,7 @@ fn presets() -> Result<(), String> {
 }
 
 fn model(matches: &ArgMatches) -> Result<(), String> {
-    check_out(matches, "out")?;
+    check_out(matches, &["out"])?;
     let grid = Grid::new(start(matches)?.grid).map_err(|error| error.to_string())?;
     let text = serde_json::to_string(&transition_model(&grid)).map_err(|error| error.to_string())?;
     match matches.get_one::<String>("out") {
@@ -265,8 +298,7 @@ struct Trained {
 }
 
 fn train(matches: &ArgMatches) -> Result<(), String> {
-    check_out(matches, "out")?;
-    check_out(matches, "curve")?;
+    check_out(matches, &["out", "curve"])?;
     let Setup { grid, config, .. } = setup(matches)?;
     let horizon = config.horizon;
     let grid = Grid::new(grid).map_err(|error| error.to_string())?;

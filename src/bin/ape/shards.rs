@@ -56,8 +56,8 @@ pub fn sweep(matches: &ArgMatches, which: &str, setup: &Setup, betas: Vec<f64>, 
     }
     // A file that cannot be written is found out before anything is computed for it.
     save(file, &shard)?;
-    let setups = missing.iter().map(|&index| Box::new(shard.sweep().setup(index)));
-    let tasks: Vec<Task> = setups.map(|setup| Task::Sweep { setup }).collect();
+    let plan = shard.sweep().clone();
+    let task = |task: usize| Task::Sweep { setup: Box::new(plan.setup(missing[task])) };
     thread::scope(|scope| {
         let (sender, done) = channel();
         let saver = scope.spawn(|| save_as_they_come(file, shard, done));
@@ -66,7 +66,7 @@ pub fn sweep(matches: &ArgMatches, which: &str, setup: &Setup, betas: Vec<f64>, 
             Outcome::Sweep(run) => sender.send((missing[task], run)).map_err(|_| "stopped".to_owned()),
             _ => Ok(()),
         };
-        let computed = run_each(&tasks, &keep);
+        let computed = run_each(missing.len(), &task, &keep);
         drop(sender);
         let saved = saver.join().map_err(|_| "the shard was not saved".to_owned())?;
         saved.and(computed)
@@ -78,7 +78,7 @@ pub fn sweep(matches: &ArgMatches, which: &str, setup: &Setup, betas: Vec<f64>, 
 
 /// Joins the files of all shards.
 pub fn merge(matches: &ArgMatches) -> Result<(), String> {
-    check_out(matches, "out")?;
+    check_out(matches, &["out"])?;
     let files = matches.get_many::<String>("files").expect("clap requires it");
     let shards = files.map(|file| Ok((file.clone(), read_shard(file)?)));
     let sweep = merge_shards(shards.collect::<Result<_, String>>()?);
