@@ -354,6 +354,38 @@ fn a_new_beta_has_no_digest_before_its_run() {
     assert!(!page.state().as_ref().unwrap().is_retraining());
 }
 
+/// β is moved there and back while its first runs are still on their way: what they show is not the last word.
+#[test]
+fn a_beta_that_is_returned_to_waits_for_its_last_run() {
+    let (mut page, here) = open(1280.0, 800.0);
+    here.0.borrow_mut().hangs = true;
+    let mut late = VecDeque::new();
+    for beta in [0.3, 0.2] {
+        page.state_mut().as_mut().unwrap().set_beta(beta);
+        let desk = &mut *here.0.borrow_mut();
+        desk.now += 100.0;
+        let now = desk.now;
+        desk.session.advance(&|| now);
+        late.extend(desk.session.events().into_iter().map(Ok));
+    }
+    let snapshots = late.iter().filter(|event| matches!(event, Ok(Event::Snapshot(_)))).count();
+    assert_eq!((late.len(), snapshots), (4, 2));
+    page.state_mut().as_mut().unwrap().set_beta(0.3);
+    // The session has nothing more to say yet.
+    let mut session = std::mem::replace(&mut here.0.borrow_mut().session, Session::new());
+    here.0.borrow_mut().events = late;
+    here.0.borrow_mut().hangs = false;
+    page.run_steps(4);
+    let shown = |page: &Page| page.state().as_ref().unwrap().shown().unwrap().0.setup.config.beta;
+    assert_eq!(shown(&page), 0.2);
+    page.get_by(|node| node.role() == Role::Status && says(node).is_some_and(|text| text == "retraining …"));
+    session.handle(Command::Seen(u32::MAX));
+    here.0.borrow_mut().session = session;
+    settle(&mut page);
+    assert_eq!(shown(&page), 0.3);
+    assert!(!page.state().as_ref().unwrap().is_retraining());
+}
+
 /// It has not said that it is gone, and may only be slow: it is the visitor who decides.
 #[test]
 fn a_worker_that_hangs_can_be_replaced() {

@@ -54,6 +54,16 @@ pub static TABS: [(Tab, &str, &str, &str); 7] = [
     (Tab::Table1, "table1", "Table 1", "The paper's comparison, over seeds"),
 ];
 
+/// What has become of the run that the controls ask for.
+#[derive(Clone, Copy, PartialEq)]
+enum Asked {
+    /// None was asked for, or it was refused.
+    Nothing,
+    /// Nothing has been heard of it.
+    Waits,
+    Begun,
+}
+
 /// What an ensemble is wanted for, once the session has sent it.
 #[derive(Clone, Copy, PartialEq)]
 pub enum Wanted {
@@ -118,8 +128,7 @@ pub struct App {
     pub(super) session: Session,
     /// When it was started again by itself.
     restarts: Vec<f64>,
-    /// Whether a run has been asked for of which nothing has been heard.
-    is_asked: bool,
+    asked: Asked,
     /// How long the session has said nothing although it should: seconds of a page that is seen.
     silence: f64,
     /// Whether the session that has died showed its last run: another can go on with it.
@@ -193,7 +202,7 @@ impl App {
             link,
             session: Session::Starting,
             restarts: Vec::new(),
-            is_asked: false,
+            asked: Asked::Nothing,
             silence: 0.0,
             can_resume: false,
             setup: Setup::default(),
@@ -281,7 +290,7 @@ impl App {
 
     /// Whether a run is on its way that has not shown anything yet: what is on the page is not what the controls say.
     pub fn is_retraining(&self) -> bool {
-        self.is_asked || self.begun.is_some()
+        self.asked == Asked::Waits || self.begun.is_some()
     }
 
     /// Whether there is a session, or one on its way.
@@ -292,7 +301,9 @@ impl App {
     /// Sends a command; while there is no session, none is needed: it will be told everything.
     pub fn send(&mut self, command: Command) {
         if matches!(self.session, Session::Ready) {
-            self.is_asked |= matches!(command, Command::Load { .. } | Command::Retrain { .. });
+            if matches!(command, Command::Load { .. } | Command::Retrain { .. }) {
+                self.asked = Asked::Waits;
+            }
             self.link.send(&command);
         }
     }
@@ -502,7 +513,10 @@ impl App {
                 }
                 Ok(Event::Started(started)) => match started.check() {
                     Ok(_) => {
-                        self.is_asked &= !self.is_of_controls(&started);
+                        if self.asked != Asked::Nothing {
+                            // Runs come in the order they were asked for: after another's, that of the controls is to come.
+                            self.asked = if self.is_of_controls(&started) { Asked::Begun } else { Asked::Waits };
+                        }
                         if started.branch_of.is_none() {
                             // With the run before went what was still wanted of it.
                             self.wanted.clear();
@@ -520,7 +534,7 @@ impl App {
                     Err(sentence) => self.distrust(&sentence),
                 },
                 Ok(Event::Refused(sentence)) => {
-                    self.is_asked = false;
+                    self.asked = Asked::Nothing;
                     self.wanted.clear();
                     self.notice = Some(sentence);
                 }
@@ -548,7 +562,7 @@ impl App {
     pub(super) fn tick(&mut self, ctx: &egui::Context) {
         let before = std::mem::replace(&mut self.now, ctx.input(|input| input.time));
         // That a run has begun is said at once, but where another comes to its end before.
-        let is_due = matches!(self.session, Session::Starting) || self.is_asked && self.begun.is_none();
+        let is_due = matches!(self.session, Session::Starting) || self.asked == Asked::Waits && self.begun.is_none();
         if is_due {
             // A page that nobody sees is not painted, and its worker may rest as well.
             self.silence += (self.now - before).min(1.0);
@@ -583,7 +597,7 @@ impl App {
     fn lose_session(&mut self, sentence: String) {
         let was_at_work = matches!(self.session, Session::Ready);
         self.can_resume = self.begun.take().is_none() && (was_at_work || self.can_resume);
-        self.is_asked = false;
+        self.asked = Asked::Nothing;
         self.wanted.clear();
         self.restarts.retain(|at| self.now - at < WITHIN);
         if !was_at_work || self.restarts.len() >= MOST_RESTARTS {
@@ -605,7 +619,7 @@ impl App {
 
     pub(super) fn restart_session(&mut self) {
         self.session = Session::Starting;
-        (self.is_asked, self.silence) = (false, 0.0);
+        (self.asked, self.silence) = (Asked::Nothing, 0.0);
         self.begun = None;
         self.wanted.clear();
         self.link.restart();
