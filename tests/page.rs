@@ -466,7 +466,7 @@ fn every_return_can_be_chosen() {
 fn play_pause_step_and_reset_have_buttons() {
     let (mut page, here) = open(1280.0, 800.0);
     for (button, command) in [
-        ("Back to the start", Command::Reset),
+        ("Back to the start", Command::Load { setup: Box::default(), play: false }),
         ("One update", Command::Step),
         ("Play", Command::Play),
         ("Pause", Command::Pause),
@@ -474,7 +474,7 @@ fn play_pause_step_and_reset_have_buttons() {
         page.get_by_role_and_label(Role::Button, button).click_accesskit();
         page.run_steps(3);
         assert_eq!(here.0.borrow().commands.iter().rfind(|c| !matches!(c, Command::Seen(_))), Some(&command));
-        if command == Command::Reset {
+        if matches!(command, Command::Load { .. }) {
             // Uniform policies hardly arrive, and the page says so.
             page.get_by(|node| {
                 says(node).is_some_and(|text| text.starts_with("The 2 experts arrive in 16 % of episodes"))

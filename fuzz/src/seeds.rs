@@ -122,7 +122,6 @@ pub fn commands() -> Vec<Vec<u8>> {
         Command::Seek { run: 2, update: 0 },
         Command::Continue { beta: 1.5 },
         Command::Speed(None),
-        Command::Reset,
         Command::Seen(3),
     ];
     let all = |first: &Command| joined(&std::iter::once(first).chain(&rest).map(encode).collect::<Vec<_>>());

@@ -11,7 +11,7 @@ use crate::mdp::{KnownReturns, Policy, Returns};
 
 /// Version of the messages: an old cached worker must not be taken for a new one. [`Event::Ready`] stays the
 /// first variant, so that every version can read every other's.
-pub const PROTOCOL: u32 = 6;
+pub const PROTOCOL: u32 = 7;
 
 /// Longest message, in bytes: the largest ensemble there can be, with its clones and its curve, takes a tenth of it.
 pub const LONGEST: usize = 16_000_000;
@@ -19,7 +19,7 @@ pub const LONGEST: usize = 16_000_000;
 /// From the page to the session.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Command {
-    /// Begin a new run; a setup that is no good is refused and the old run stays.
+    /// Begin a new run, or the same one again; a setup that is no good is refused and the old run stays.
     Load {
         setup: Box<Setup>,
         play: bool,
@@ -52,8 +52,6 @@ pub enum Command {
     Pause,
     /// One update, then pause.
     Step,
-    /// Back to the start of the run, paused.
-    Reset,
     /// Updates per second, from 0.01 to 1,000,000; `None` is as fast as it goes.
     Speed(Option<f32>),
     /// Clones to evaluate besides that of the run's own observer, sixteen at most; those that are not quick are left out.

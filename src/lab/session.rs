@@ -120,10 +120,9 @@ impl Session {
     /// Takes a command. What is not possible is refused with a sentence and changes nothing.
     pub fn handle(&mut self, command: Command) {
         let waits = match command {
-            Command::Load { .. } | Command::Resume { .. } => false,
-            Command::Speed(_) | Command::Show(_) | Command::Seen(_) => false,
+            Command::Resume { .. } | Command::Speed(_) | Command::Show(_) | Command::Seen(_) => false,
             // A new run takes the place of the old one, and of all that was to be done with it; but its ensemble is waited for.
-            Command::Retrain { .. } => self.waiting.contains(&Command::Export),
+            Command::Load { .. } | Command::Retrain { .. } => self.waiting.contains(&Command::Export),
             _ => true,
         };
         if self.resuming.is_some() && waits {
@@ -187,13 +186,6 @@ impl Session {
                 run.last_update = run.last_update.max(run.trainer().updates() + 1);
                 run.set_course_updates();
                 run.update(&|| 0.0);
-            }
-            Command::Reset => {
-                self.begin_queued()?;
-                let mut setup = self.run.as_ref().ok_or(NOTHING)?.setup.clone();
-                setup.config.beta = setup.last_beta();
-                setup.course = Course::default();
-                self.begin(setup, false, false)?;
             }
             Command::Speed(speed) => {
                 if let Some(speed) = speed.filter(|speed| !SPEEDS.contains(speed)) {

@@ -420,7 +420,7 @@ impl App {
             self.preset = None;
         }
         (self.promise, self.reproduced, self.view.sought) = (None, None, None);
-        self.send(Command::Reset);
+        self.send_setup(false);
     }
 
     /// The run goes on from the moment shown with this β; where that lies back, on a branch.
@@ -460,8 +460,8 @@ impl App {
         self.view.sought.or(self.shown.as_ref().map(|shown| shown.snapshot.update)).unwrap_or(0)
     }
 
-    fn send_setup(&mut self) {
-        self.send(Command::Load { setup: Box::new(self.setup.clone()), play: true });
+    fn send_setup(&mut self, play: bool) {
+        self.send(Command::Load { setup: Box::new(self.setup.clone()), play });
     }
 
     /// Trains what the controls say; what was said of the run before is gone.
@@ -470,7 +470,7 @@ impl App {
         self.promise = None;
         self.reproduced = None;
         self.view.sought = None;
-        self.send_setup();
+        self.send_setup(true);
     }
 
     /// The clone that is trained against, and the honest one or the blind one beside it.
@@ -503,7 +503,7 @@ impl App {
                         None => {
                             // The runs of a session that is gone had other numbers.
                             self.slow_clones.clear(&mut self.pool);
-                            self.send_setup();
+                            self.send_setup(true);
                         }
                     }
                 }
