@@ -386,6 +386,143 @@ fn a_beta_that_is_returned_to_waits_for_its_last_run() {
     assert!(!page.state().as_ref().unwrap().is_retraining());
 }
 
+/// What cannot be trained changes nothing: neither the controls nor the run, and β can be moved afterwards.
+#[test]
+fn a_configuration_that_is_no_good_is_refused_before_it_is_set() {
+    let (mut page, here) = open(1280.0, 800.0);
+    page.state_mut().as_mut().unwrap().load_preset(4);
+    settle(&mut page);
+    page.get_by_label_contains("gru: learns").click_accesskit();
+    page.run_steps(3);
+    let app = page.state().as_ref().unwrap();
+    assert_eq!((app.preset(), app.is_retraining()), (Some(4), false));
+    page.get_by(|node| node.role() == Role::Alert && says(node).is_some_and(|text| text.contains("adversary_reward")));
+    page.state_mut().as_mut().unwrap().set_beta(0.2);
+    settle(&mut page);
+    let desk = here.0.borrow();
+    assert!(!desk.commands.iter().any(|c| matches!(c, Command::Load { setup, .. } if setup.check().is_err())));
+}
+
+/// Between a move of β at the end of a run and the first word of what follows, the digest on the page is of the run before.
+#[test]
+fn a_beta_continued_with_has_no_digest_before_the_run_has_heard_of_it() {
+    let desktop = Desktop::default();
+    let (mut page, here) = open_with(1280.0, 800.0, desktop.clone());
+    here.0.borrow_mut().hangs = true;
+    page.state_mut().as_mut().unwrap().continue_with(0.3);
+    page.run_steps(60);
+    let address = desktop.address.borrow().clone();
+    assert!(address.contains("turns=732:0.3") && !address.contains("digest"), "{address}");
+    assert!(!text(&page, "trained").contains("digest"));
+    // The session is lost before it has heard of it; what the address and the controls say is trained by the next one.
+    here.0.borrow_mut().events = VecDeque::from([Err("The worker has stopped.".to_owned())]);
+    here.0.borrow_mut().hangs = false;
+    page.run_steps(6);
+    until(&mut page, "trained, update 1464 of 1464");
+    let (_, snapshot) = page.state().as_ref().unwrap().shown().unwrap();
+    assert_eq!((snapshot.beta, snapshot.course.turns.clone()), (0.3, vec![(732, 0.3)]));
+    let digest = snapshot.digest;
+
+    desktop.visits.borrow_mut().push(address);
+    page.run_steps(3);
+    until(&mut page, "trained, update 1464 of 1464");
+    assert_eq!(page.state().as_ref().unwrap().shown().unwrap().1.digest, digest);
+}
+
+/// Pictures from before a move of β do not take it back.
+#[test]
+fn a_beta_on_its_way_is_not_taken_back() {
+    let (mut page, here) = open(1280.0, 800.0);
+    press(&mut page, "Back to the start");
+    page.run_steps(3);
+    press(&mut page, "One update");
+    page.run_steps(3);
+    // A snapshot that was made before the session heard of the move.
+    here.0.borrow_mut().session.handle(Command::Step);
+    page.state_mut().as_mut().unwrap().hear();
+    page.state_mut().as_mut().unwrap().continue_with(0.3);
+    let commands = here.0.borrow().commands.len();
+    let (_, snapshot) = page.state().as_ref().unwrap().shown().unwrap();
+    let mut late = snapshot.clone();
+    late.number += 1;
+    late.curve.clear();
+    here.0.borrow_mut().events = VecDeque::from([Ok(Event::Snapshot(Box::new(late)))]);
+    let session = std::mem::replace(&mut here.0.borrow_mut().session, Session::new());
+    page.state_mut().as_mut().unwrap().hear();
+    let app = page.state_mut().as_mut().unwrap();
+    assert_eq!(app.setup().last_beta(), 0.3);
+    app.set_beta(0.3);
+    assert_eq!(here.0.borrow().commands.len(), commands);
+    here.0.borrow_mut().session = session;
+    settle(&mut page);
+    assert_eq!(page.state().as_ref().unwrap().setup().last_beta(), 0.3);
+    assert!(page.state().as_ref().unwrap().shows_controls());
+}
+
+/// Whoever goes back to the start and plays is not taken for somebody who wants to pause what is not there yet.
+#[test]
+fn what_is_pressed_before_the_start_is_there_counts() {
+    let (mut page, here) = open(1280.0, 800.0);
+    let last =
+        |here: &Here| here.0.borrow().commands.iter().rfind(|c| !matches!(c, Command::Seen(_))).cloned().unwrap();
+    here.0.borrow_mut().hangs = true;
+    for (key, command) in [(egui::Key::Space, Command::Play), (egui::Key::Space, Command::Pause)] {
+        if command == Command::Play {
+            page.key_press(egui::Key::R);
+            page.step();
+            assert!(matches!(last(&here), Command::Load { play: false, .. }));
+        }
+        page.key_press(key);
+        page.step();
+        assert_eq!(last(&here), command);
+    }
+    page.key_press(egui::Key::R);
+    page.step();
+    // It dies before it has gone back: another one stands at the start, too.
+    here.0.borrow_mut().events = VecDeque::from([Err("The worker has stopped.".to_owned())]);
+    here.0.borrow_mut().session = Session::new();
+    here.0.borrow_mut().hangs = false;
+    page.run_steps(6);
+    until(&mut page, "paused at update 0 of 732");
+}
+
+/// Playing on from a moment that was looked for but never seen leaves nothing behind that is looked for.
+#[test]
+fn to_play_on_ends_the_search_for_a_moment() {
+    let (mut page, here) = open(1280.0, 800.0);
+    page.state_mut().as_mut().unwrap().view.speed = 0;
+    here.0.borrow_mut().hangs = true;
+    page.key_press(egui::Key::Home);
+    page.step();
+    assert_eq!(page.state().as_ref().unwrap().moment(), 0);
+    page.key_press(egui::Key::S);
+    page.step();
+    here.0.borrow_mut().hangs = false;
+    until(&mut page, "paused at update 1 of 732");
+    assert_eq!(page.state().as_ref().unwrap().moment(), 1);
+    page.key_press(egui::Key::Home);
+    until(&mut page, "paused at update 0 of 732");
+}
+
+/// A link promises a moment; until it is there the visitor may look back at what there is.
+#[test]
+fn looking_back_while_a_link_is_made_true_is_left_alone() {
+    let desktop = Desktop::default();
+    desktop.visits.borrow_mut().push("v=1&speed=60&digest=0123456789abcdef".to_owned());
+    let (mut page, _) = open_with(1280.0, 800.0, desktop);
+    until(&mut page, "training, update 1");
+    page.key_press(egui::Key::Space);
+    until(&mut page, "paused");
+    page.state_mut().as_mut().unwrap().seek(2);
+    until(&mut page, "paused at update 2 of 732");
+    page.run_steps(20);
+    assert_eq!(page.state().as_ref().unwrap().moment(), 2);
+    page.state_mut().as_mut().unwrap().send(Command::Speed(None));
+    page.key_press(egui::Key::Space);
+    until(&mut page, "trained");
+    assert!(text(&page, "trained").ends_with("but the link was made with 0123456789abcdef"));
+}
+
 /// It has not said that it is gone, and may only be slow: it is the visitor who decides.
 #[test]
 fn a_worker_that_hangs_can_be_replaced() {

@@ -618,14 +618,17 @@ fn a_new_beta_need_not_wait_for_a_run_that_is_made_again() {
     assert!(desk.snapshots.iter().all(|snapshot| (snapshot.run, snapshot.beta) == (5, 0.3)));
     assert_eq!(desk.last().update, short().updates());
 
-    let mut desk = Desk::new();
-    desk.send(resume());
-    desk.send(Command::Export);
-    desk.send(Command::Retrain { beta: 0.3 });
-    assert_eq!((desk.exported.len(), desk.started.len()), (0, 0));
-    desk.run(1e6);
-    assert_eq!((desk.exported[0].run, desk.exported[0].update), (4, 3));
-    assert_eq!((desk.started[0].run, desk.last().run, desk.last().update), (5, 5, short().updates()));
+    let setup = Box::new(Setup { config: Config { beta: 0.3, ..short() }, ..Setup::default() });
+    for command in [Command::Retrain { beta: 0.3 }, Command::Load { setup, play: true }] {
+        let mut desk = Desk::new();
+        desk.send(resume());
+        desk.send(Command::Export);
+        desk.send(command);
+        assert_eq!((desk.exported.len(), desk.started.len()), (0, 0));
+        desk.run(1e6);
+        assert_eq!((desk.exported[0].run, desk.exported[0].update), (4, 3));
+        assert_eq!((desk.started[0].run, desk.last().run, desk.last().update), (5, 5, short().updates()));
+    }
 }
 
 /// A run that is made again also goes back to where it was a few milliseconds at a time.

@@ -19,6 +19,6 @@ pub use link::Link;
 pub use pool::{Hand, Pool, TaskId};
 pub use protocol::{CloneView, Command, Event, Exported, PROTOCOL, PolicyView, RunState, Snapshot, Started, TaskEvent};
 pub use protocol::{decode, encode};
-pub use session::{Pace, Session};
+pub use session::{IN_FLIGHT, Pace, Session};
 #[cfg(not(target_arch = "wasm32"))]
 pub use thread::{ThreadLink, thread_pool};

@@ -17,7 +17,7 @@ const STRETCH: f64 = 8.0;
 /// Least time between two snapshots, in milliseconds: 60 a second.
 const FRAME: f64 = 1000.0 / 60.0;
 /// Snapshots that may be on their way to the page.
-const IN_FLIGHT: usize = 2;
+pub const IN_FLIGHT: u32 = 2;
 /// How long the page may owe an answer before training waits for it, in milliseconds.
 const PATIENCE: f64 = 250.0;
 /// Points that a whole run leaves on the curve.
@@ -355,7 +355,7 @@ impl Session {
             if has_ended && self.next_beta.is_some() {
                 // The newest β is wanted; what was trained is shown all the same, for the eye to follow, as long
                 // as the page keeps up.
-                if self.in_flight.len() < IN_FLIGHT {
+                if self.in_flight.len() < IN_FLIGHT as usize {
                     self.snapshot(clock);
                 }
                 if let Err(sentence) = self.begin_queued() {
@@ -365,7 +365,7 @@ impl Session {
             }
         }
         let is_hidden = self.run.as_ref().is_none_or(|run| run.is_silent && run.is_playing);
-        if self.is_changed && !is_hidden && self.in_flight.len() < IN_FLIGHT {
+        if self.is_changed && !is_hidden && self.in_flight.len() < IN_FLIGHT as usize {
             let now = clock();
             if now >= self.next_snapshot {
                 self.snapshot(clock);

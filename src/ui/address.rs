@@ -54,8 +54,8 @@ impl App {
             put("cell", format!("{},{}", cell / cols, cell % cols));
         }
         let is_resting = matches!(snapshot.state, RunState::Paused | RunState::Finished) && !self.is_retraining();
-        // While it changes, the end of the run is what is linked to.
-        if is_resting && setup.course.turns.len() == self.setup.course.turns.len() {
+        // While it changes, the end of the run is what is linked to; so it is while something else is shown than the controls say.
+        if is_resting && self.shows_controls() && setup.course.turns.len() == self.setup.course.turns.len() {
             if snapshot.update != snapshot.last_update {
                 put("at", snapshot.update.to_string());
             }

@@ -19,7 +19,7 @@ use crate::ape::observer::ObserverChoice;
 use crate::ape::{Config, Digest, EnsembleFile};
 use crate::attack::AttackerChoice;
 use crate::experiment::{Course, CurvePoint, Denied, PRESETS, Setup};
-use crate::lab::{Command, Event, Exported, Link, PROTOCOL, Pool, RunState, Snapshot, Started};
+use crate::lab::{Command, Event, Exported, IN_FLIGHT, Link, PROTOCOL, Pool, RunState, Snapshot, Started};
 use crate::mdp::GridSpec;
 
 /// What moving β does.
@@ -129,6 +129,10 @@ pub struct App {
     /// When it was started again by itself.
     restarts: Vec<f64>,
     asked: Asked,
+    /// Whether that run is to play once it has begun.
+    plays: bool,
+    /// A β that the run is to go on with, and the last snapshot that may have been made before the session heard of it.
+    continued: Option<(f64, u32)>,
     /// How long the session has said nothing although it should: seconds of a page that is seen.
     silence: f64,
     /// Whether the session that has died showed its last run: another can go on with it.
@@ -176,6 +180,8 @@ pub struct App {
     pub(super) taken: u64,
     /// A snapshot that has come and not been drawn yet.
     pub(super) undrawn: Option<u32>,
+    /// The last snapshot that the session was told has been drawn.
+    seen: u32,
 }
 
 /// What an address says of the run it opens.
@@ -203,6 +209,8 @@ impl App {
             session: Session::Starting,
             restarts: Vec::new(),
             asked: Asked::Nothing,
+            plays: true,
+            continued: None,
             silence: 0.0,
             can_resume: false,
             setup: Setup::default(),
@@ -248,6 +256,7 @@ impl App {
             now: 0.0,
             taken: 0,
             undrawn: None,
+            seen: 0,
         };
         app.recall_preferences(ctx);
         app.is_new = app.host.kept("visited").is_none();
@@ -293,6 +302,17 @@ impl App {
         self.asked == Asked::Waits || self.begun.is_some()
     }
 
+    /// Whether training is under way.
+    pub fn is_playing(&self) -> bool {
+        let is_shown_playing = self.shown().is_some_and(|(_, snapshot)| snapshot.state == RunState::Playing);
+        if self.is_retraining() { self.plays } else { is_shown_playing }
+    }
+
+    /// Whether the moment on the page is one of what the controls say, and no other β is on its way to it.
+    pub fn shows_controls(&self) -> bool {
+        self.shown.as_ref().is_some_and(|shown| shown.is_of(&self.setup))
+    }
+
     /// Whether there is a session, or one on its way.
     pub fn is_session_alive(&self) -> bool {
         !matches!(self.session, Session::Failed(_))
@@ -300,9 +320,21 @@ impl App {
 
     /// Sends a command; while there is no session, none is needed: it will be told everything.
     pub fn send(&mut self, command: Command) {
+        match command {
+            Command::Load { play, .. } => self.plays = play,
+            Command::Retrain { .. } | Command::Continue { .. } => self.plays = true,
+            Command::Play => self.plays = true,
+            Command::Step | Command::Pause => self.plays = false,
+            Command::Seen(number) => self.seen = number,
+            _ => {}
+        }
         if matches!(self.session, Session::Ready) {
             if matches!(command, Command::Load { .. } | Command::Retrain { .. }) {
                 self.asked = Asked::Waits;
+            }
+            if matches!(command, Command::Play | Command::Step) {
+                // It goes there first, and on at once: that moment may never be seen.
+                self.view.sought = None;
             }
             self.link.send(&command);
         }
@@ -312,14 +344,18 @@ impl App {
         self.begin((PRESETS[index].setup)(), Some(index));
     }
 
-    /// Trains with another configuration; a given ensemble is left for it.
+    /// Trains with another configuration; a given ensemble is left for it. One that is no good is refused with a sentence.
     pub fn reconfigure(&mut self, config: Config) {
-        if config.observer != self.setup.config.observer {
-            self.show_clones_of(config.observer);
+        let config = Config { beta: self.setup.last_beta(), ..config };
+        let setup = Setup { grid: self.setup.grid.clone(), config, ..Setup::default() };
+        if let Err(error) = setup.check() {
+            self.notice = Some(format!("{error}."));
+            return;
         }
-        self.setup.config = Config { beta: self.setup.last_beta(), ..config };
-        self.setup.course = Course::default();
-        self.setup.ensemble = None;
+        if setup.config.observer != self.setup.config.observer {
+            self.show_clones_of(setup.config.observer);
+        }
+        self.setup = setup;
         self.preset = None;
         self.opened = None;
         self.load();
@@ -377,16 +413,18 @@ impl App {
     /// Shows the ensemble of a file; one that is no good is refused with a sentence.
     pub(super) fn open(&mut self, name: String, text: Result<String, String>) {
         let file = text.clone().and_then(|text| EnsembleFile::parse(&text).map_err(|error| error.to_string()));
-        let checked = file.and_then(|file| file.clone().check().map(|_| file).map_err(|error| error.to_string()));
+        let checked = file.and_then(|file| {
+            let (grid, config) = (file.grid.clone(), file.config.clone().unwrap_or_default());
+            let left_out = file.left_out.clone();
+            let setup = Setup { grid, config, course: Course::default(), ensemble: Some(file) };
+            setup.check().map_err(|error| error.to_string())?;
+            Ok((setup, left_out))
+        });
         match checked {
             Err(sentence) => self.notice = Some(format!("{name}: {sentence}.")),
-            Ok(file) => {
-                let left_out =
-                    file.left_out.as_ref().map(|why| format!("{name}: its config is not ours and left out ({why})."));
-                self.setup.grid = file.grid.clone();
-                self.setup.config = file.config.clone().unwrap_or_default();
-                self.setup.course = Course::default();
-                self.setup.ensemble = Some(file);
+            Ok((setup, left_out)) => {
+                let left_out = left_out.map(|why| format!("{name}: its config is not ours and left out ({why})."));
+                self.setup = setup;
                 self.preset = None;
                 self.show_clones_of(self.setup.config.observer);
                 self.load();
@@ -427,7 +465,13 @@ impl App {
     pub fn continue_with(&mut self, beta: f64) {
         if let Some(shown) = &self.shown {
             // The session will say the same.
-            self.setup.course.turn(shown.snapshot.update, beta);
+            let update = shown.snapshot.update;
+            if update >= self.setup.updates() {
+                let last = update.saturating_add(self.setup.config.updates());
+                self.setup.course.updates = Some(last.min(Config::MOST_UPDATES));
+            }
+            self.setup.course.turn(update, beta);
+            self.continued = Some((beta, self.seen.saturating_add(IN_FLIGHT)));
             self.preset = None;
             self.promise = None;
             self.view.sought = None;
@@ -503,7 +547,8 @@ impl App {
                         None => {
                             // The runs of a session that is gone had other numbers.
                             self.slow_clones.clear(&mut self.pool);
-                            self.send_setup(true);
+                            self.reproduced = None;
+                            self.send_setup(self.plays);
                         }
                     }
                 }
@@ -534,7 +579,7 @@ impl App {
                     Err(sentence) => self.distrust(&sentence),
                 },
                 Ok(Event::Refused(sentence)) => {
-                    self.asked = Asked::Nothing;
+                    (self.asked, self.continued) = (Asked::Nothing, None);
                     self.wanted.clear();
                     self.notice = Some(sentence);
                 }
@@ -596,9 +641,8 @@ impl App {
     /// The session has died. One that was at work is started again, unless that has been of no use.
     fn lose_session(&mut self, sentence: String) {
         let was_at_work = matches!(self.session, Session::Ready);
-        self.can_resume = self.begun.take().is_none() && (was_at_work || self.can_resume);
-        self.asked = Asked::Nothing;
-        self.wanted.clear();
+        self.can_resume = !self.is_retraining() && (was_at_work || self.can_resume);
+        self.forget_session();
         self.restarts.retain(|at| self.now - at < WITHIN);
         if !was_at_work || self.restarts.len() >= MOST_RESTARTS {
             self.session = Session::Failed(sentence);
@@ -619,20 +663,25 @@ impl App {
 
     pub(super) fn restart_session(&mut self) {
         self.session = Session::Starting;
-        (self.asked, self.silence) = (Asked::Nothing, 0.0);
-        self.begun = None;
-        self.wanted.clear();
+        self.can_resume &= !self.is_retraining();
+        self.forget_session();
         self.link.restart();
+    }
+
+    /// Nothing more comes of what the session was asked for.
+    fn forget_session(&mut self) {
+        (self.asked, self.begun, self.continued) = (Asked::Nothing, None, None);
+        (self.silence, self.seen) = (0.0, 0);
+        self.wanted.clear();
     }
 
     /// What tells another session of the run on the page, where the controls still say the same.
     fn resumption(&self) -> Option<Command> {
-        let Shown { started, snapshot, .. } = self.shown.as_ref().filter(|_| self.can_resume)?;
-        let setup = Setup { course: snapshot.course.clone(), ..started.setup.clone() };
-        let is_same = setup == self.setup && snapshot.state != RunState::Given;
+        let Shown { snapshot, .. } = self.shown.as_ref().filter(|_| self.can_resume)?;
+        let is_same = self.shows_controls() && snapshot.state != RunState::Given;
         is_same.then(|| Command::Resume {
             run: snapshot.run,
-            setup: Box::new(setup),
+            setup: Box::new(self.setup.clone()),
             recorded: snapshot.recorded,
             update: self.moment(),
             is_playing: snapshot.state == RunState::Playing && self.view.sought.is_none(),
@@ -707,8 +756,10 @@ impl App {
     /// What follows from a new snapshot: the course of its run, and the moment that the address asks for.
     fn follow(&mut self) {
         let Some(Shown { snapshot, started, .. }) = &self.shown else { return };
-        // Unless the controls have gone on to another run.
-        if self.begun.is_none() && self.is_of_controls(started) {
+        self.continued = self.continued.filter(|(_, last)| snapshot.number <= *last);
+        let is_older = self.continued.is_some_and(|(beta, _)| snapshot.beta != beta);
+        // Unless the controls have gone on to another run, or to another β.
+        if !self.is_retraining() && !is_older && self.is_of_controls(started) {
             self.setup.course = snapshot.course.clone();
         }
         if self.view.sought == Some(snapshot.update) {
@@ -721,7 +772,7 @@ impl App {
                 let run = snapshot.run;
                 self.reproduced = promise.digest.map(|promised| Reproduced { run, update, promised });
                 self.promise = None;
-            } else {
+            } else if update <= snapshot.recorded {
                 self.seek(update);
             }
         }

@@ -8,7 +8,7 @@ use super::heatmap::{self, Pictures};
 use super::panels::{self, Ground, Panel, Plan, Touched};
 use super::theme::{self, GAP, NARROW};
 use super::{chart, inspector, timeline};
-use crate::experiment::CurvePoint;
+use crate::experiment::{CurvePoint, Setup};
 use crate::lab::{RunState, Snapshot, Started};
 use crate::mdp::Grid;
 
@@ -41,6 +41,13 @@ impl Shown {
         if self.snapshot.update == self.snapshot.recorded && self.snapshot.state != RunState::Playing {
             self.end = Some(Box::new(self.snapshot.clone()));
         }
+    }
+
+    /// Whether it is a run of this setup, with all that it says of β.
+    pub fn is_of(&self, setup: &Setup) -> bool {
+        let own = &self.started.setup;
+        (&own.grid, &own.config, &own.ensemble) == (&setup.grid, &setup.config, &setup.ensemble)
+            && self.snapshot.course == setup.course
     }
 
     pub fn grid(&self) -> &Grid {

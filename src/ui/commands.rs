@@ -8,7 +8,7 @@ use super::app::{App, TABS, Tab, Wanted};
 use super::theme::Palette;
 use super::widgets::{Icon, dialog, icon_button};
 use crate::experiment::{PRESETS, WORLDS};
-use crate::lab::{Command as ToSession, RunState};
+use crate::lab::Command as ToSession;
 use crate::picture::COLOR_MAPS;
 
 /// A line of the table.
@@ -529,12 +529,6 @@ pub fn show_palette(ctx: &Context, app: &mut App) {
 }
 
 impl App {
-    /// Whether training is under way.
-    pub fn is_playing(&self) -> bool {
-        let state = self.shown().map(|(_, snapshot)| snapshot.state);
-        state == Some(RunState::Playing) || self.is_retraining()
-    }
-
     /// Moves β by a little, on the slider's grid.
     fn move_beta(&mut self, by: f64) {
         let beta = libm::round((self.setup().last_beta() + by) * 100.0) / 100.0;

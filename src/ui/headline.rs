@@ -224,6 +224,10 @@ fn progress(app: &App) -> String {
 
 /// The digest of the moment shown, and whether it is that of the link which was opened.
 fn digest(app: &App, snapshot: &Snapshot) -> String {
+    // Of another run, or before a β that is on its way has come, it would stand beside what it is not of.
+    if snapshot.state != RunState::Given && !app.shows_controls() {
+        return String::new();
+    }
     let text = snapshot.digest.map_or(String::new(), |digest| format!(", digest {digest}"));
     match app.promised() {
         None => text,

@@ -82,9 +82,8 @@ fn transport(ui: &mut Ui, app: &mut App) {
     let can_train = app.setup().ensemble.is_none() && state.is_some() && app.is_session_alive();
     ui.add_enabled_ui(can_train, |ui| {
         ui.spacing_mut().item_spacing.x = 4.0;
-        let is_playing = state == Some(RunState::Playing) || app.is_retraining();
         let (icon, name) = match state {
-            _ if is_playing => (Icon::Pause, "Pause"),
+            _ if app.is_playing() => (Icon::Pause, "Pause"),
             Some(RunState::Finished) => (Icon::Play, "Train on for another run"),
             _ => (Icon::Play, "Play"),
         };
