@@ -459,6 +459,48 @@ fn a_beta_on_its_way_is_not_taken_back() {
     assert!(page.state().as_ref().unwrap().shows_controls());
 }
 
+/// Back at the start of a run that was continued with another β, its old pictures do not bring that back.
+#[test]
+fn a_course_that_was_left_is_not_taken_up_again() {
+    let (mut page, here) = open(1280.0, 800.0);
+    page.state_mut().as_mut().unwrap().continue_with(0.3);
+    until(&mut page, "trained, update 1464 of 1464");
+    let late = page.state().as_ref().unwrap().shown().unwrap().1.clone();
+    page.state_mut().as_mut().unwrap().continue_with(0.6);
+    until(&mut page, "trained, update 2196 of 2196");
+    here.0.borrow_mut().hangs = true;
+    page.state_mut().as_mut().unwrap().reset();
+    here.0.borrow_mut().session = Session::new();
+    here.0.borrow_mut().events = VecDeque::from([Ok(Event::Snapshot(Box::new(late)))]);
+    here.0.borrow_mut().hangs = false;
+    page.state_mut().as_mut().unwrap().hear();
+    assert_eq!(page.state().as_ref().unwrap().setup().course, Default::default());
+}
+
+/// The runs of another worker are counted from one again: one of the same number is not that of the link.
+#[test]
+fn a_link_says_nothing_of_the_runs_of_another_worker() {
+    let desktop = Desktop::default();
+    desktop.visits.borrow_mut().push("v=1&digest=0123456789abcdef".to_owned());
+    let (mut page, here) = open_with(1280.0, 800.0, desktop);
+    settle(&mut page);
+    assert!(text(&page, "trained").ends_with("but the link was made with 0123456789abcdef"));
+    let of_link = page.state().as_ref().unwrap().shown().unwrap().0.run;
+    for _ in 0..4 {
+        here.0.borrow_mut().events.push_back(Err("The worker has stopped.".to_owned()));
+        page.run_steps(6);
+    }
+    page.state_mut().as_mut().unwrap().set_beta(0.2);
+    page.get_by_role_and_label(Role::Button, "Restart the worker").click_accesskit();
+    page.run_steps(3);
+    settle(&mut page);
+    page.state_mut().as_mut().unwrap().set_beta(0.3);
+    settle(&mut page);
+    let (started, _) = page.state().as_ref().unwrap().shown().unwrap();
+    assert_eq!((started.run, started.setup.config.beta), (of_link, 0.3));
+    assert!(!text(&page, "trained").contains("link"));
+}
+
 /// Whoever goes back to the start and plays is not taken for somebody who wants to pause what is not there yet.
 #[test]
 fn what_is_pressed_before_the_start_is_there_counts() {
@@ -541,6 +583,17 @@ fn a_worker_that_hangs_can_be_replaced() {
     here.0.borrow_mut().hangs = true;
     pass(&mut page, 60);
     assert!(!is_offered(&page));
+    // One that has been started again before hangs when it is sent back to the start: another stands there, not at the end.
+    here.0.borrow_mut().events = VecDeque::from([Err("The worker has stopped.".to_owned())]);
+    here.0.borrow_mut().hangs = false;
+    page.step();
+    settle(&mut page);
+    here.0.borrow_mut().hangs = true;
+    press(&mut page, "Back to the start");
+    pass(&mut page, 12);
+    page.get_by_label("Restart the worker").click_accesskit();
+    until(&mut page, "paused at update 0 of 732");
+    here.0.borrow_mut().hangs = true;
     // That a run has begun is said at once.
     page.state_mut().as_mut().unwrap().load_preset(1);
     page.step();
@@ -556,7 +609,7 @@ fn a_worker_that_hangs_can_be_replaced() {
     page.get_by_label("Restart the worker").click_accesskit();
     settle(&mut page);
     assert!(!is_offered(&page));
-    assert_eq!((here.0.borrow().starts, page.state().as_ref().unwrap().preset()), (2, Some(1)));
+    assert_eq!((here.0.borrow().starts, page.state().as_ref().unwrap().preset()), (4, Some(1)));
 }
 
 #[test]
