@@ -354,6 +354,20 @@ fn a_new_beta_has_no_digest_before_its_run() {
     assert!(!page.state().as_ref().unwrap().is_retraining());
 }
 
+/// Nothing that stands above the slider, and was drawn before it was moved, is of before: not for a single frame.
+#[test]
+fn a_digest_goes_in_the_frame_in_which_beta_moves() {
+    let (mut page, here) = open(1280.0, 800.0);
+    here.0.borrow_mut().hangs = true;
+    page.get_by_role_and_label(Role::Slider, "β").focus();
+    page.run_steps(4);
+    text(&page, "trained");
+    page.key_down(egui::Key::ArrowRight);
+    page.step();
+    assert_ne!(page.state().as_ref().unwrap().setup().last_beta(), 0.6);
+    text(&page, "retraining …");
+}
+
 /// β is moved there and back while its first runs are still on their way: what they show is not the last word.
 #[test]
 fn a_beta_that_is_returned_to_waits_for_its_last_run() {

@@ -37,7 +37,12 @@ impl eframe::App for App {
 impl App {
     /// Draws the page, and says what has been drawn.
     pub fn show(&mut self, ui: &mut Ui) {
+        let before = (self.is_retraining(), self.shows_controls());
         self.draw(ui);
+        if before != (self.is_retraining(), self.shows_controls()) {
+            // What stands above what was moved is of before: this frame is drawn once more.
+            ui.ctx().request_discard("the controls have moved");
+        }
         if let Some(number) = self.undrawn.take() {
             self.send(Command::Seen(number));
         }
