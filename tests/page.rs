@@ -1,14 +1,15 @@
 #![cfg(all(feature = "page", not(target_arch = "wasm32")))]
 //! The page as egui draws it, without a window: what it says, what its controls do, that nothing is cut off.
 
-use std::cell::RefCell;
+use std::cell::{Cell, RefCell};
 use std::collections::{HashMap, VecDeque};
 use std::rc::Rc;
 
-use ape_lab::ape::EnsembleFile;
+use ape_lab::ape::{Config, EnsembleFile};
 use ape_lab::attack::AttackerChoice;
 use ape_lab::experiment::{Bench, Sweep, Task};
 use ape_lab::lab::{Command, Event, Hand, Link, PROTOCOL, Pool, Session, TaskEvent};
+use ape_lab::mdp::GridSpec;
 use ape_lab::ui::{App, Host};
 use egui::accesskit::Role;
 use egui_kittest::Harness;
@@ -68,13 +69,16 @@ impl Link for Here {
     }
 }
 
-/// Does a task while it is begun, and tells of it when asked.
+/// Does a task while it is begun, and tells of it when asked; one that may not do it says so.
 #[derive(Default)]
-struct AtOnce(VecDeque<TaskEvent>);
+struct AtOnce(VecDeque<TaskEvent>, Rc<Cell<bool>>);
 
 impl Hand for AtOnce {
     fn begin(&mut self, task: &Task) {
         self.0.push_back(TaskEvent::Progress(0.5));
+        if self.1.get() {
+            return self.0.push_back(TaskEvent::Failed("Out of memory.".to_owned()));
+        }
         self.0.push_back(match task.run(&|| 0.0, &mut |_| true) {
             Ok(outcome) => TaskEvent::Done(Box::new(outcome.expect("it was not told to stop")), 1.0),
             Err(sentence) => TaskEvent::Failed(sentence),
@@ -103,6 +107,7 @@ struct Desktop {
     visits: Rc<RefCell<Vec<String>>>,
     address: Rc<RefCell<String>>,
     kept: Rc<RefCell<HashMap<String, String>>>,
+    tasks_fail: Rc<Cell<bool>>,
 }
 
 impl Host for Desktop {
@@ -171,7 +176,8 @@ fn open_with<'a>(width: f32, height: f32, desktop: Desktop) -> (Page<'a>, Here) 
                 }
                 // Fonts and styles hold from the next frame on.
                 None => {
-                    let pool = Pool::new(2, || Box::new(AtOnce::default()));
+                    let fails = desktop.tasks_fail.clone();
+                    let pool = Pool::new(2, move || Box::new(AtOnce(VecDeque::new(), fails.clone())));
                     *app = Some(App::new(ui.ctx(), Box::new(link.clone()), pool, Box::new(desktop.clone())));
                 }
             }
@@ -489,6 +495,40 @@ fn a_course_that_was_left_is_not_taken_up_again() {
     here.0.borrow_mut().hangs = false;
     page.state_mut().as_mut().unwrap().hear();
     assert_eq!(page.state().as_ref().unwrap().setup().course, Default::default());
+}
+
+/// What a link promises is not made true by a picture of the run before.
+#[test]
+fn an_old_picture_does_not_keep_a_promise() {
+    let desktop = Desktop::default();
+    let (mut page, here) = open_with(1280.0, 800.0, desktop.clone());
+    let late = page.state().as_ref().unwrap().shown().unwrap().1.clone();
+    desktop.visits.borrow_mut().push("v=1&beta=0.3&digest=0123456789abcdef".to_owned());
+    // It is read after the session has been heard; the picture comes next, and then the run.
+    here.0.borrow_mut().hangs = true;
+    page.state_mut().as_mut().unwrap().hear();
+    here.0.borrow_mut().events = VecDeque::from([Ok(Event::Snapshot(Box::new(late)))]);
+    here.0.borrow_mut().hangs = false;
+    settle(&mut page);
+    assert_eq!(page.state().as_ref().unwrap().setup().config.beta, 0.3);
+    assert!(text(&page, "trained").ends_with("but the link was made with 0123456789abcdef"));
+}
+
+/// Pause counts although the worker that is told of it is not there yet.
+#[test]
+fn a_run_that_was_paused_while_its_worker_was_gone_stays_so() {
+    let (mut page, here) = open(1280.0, 800.0);
+    page.state_mut().as_mut().unwrap().send(Command::Play);
+    page.step();
+    until(&mut page, "training");
+    for _ in 0..4 {
+        here.0.borrow_mut().events.push_back(Err("The worker has stopped.".to_owned()));
+        page.step();
+    }
+    page.state_mut().as_mut().unwrap().send(Command::Pause);
+    page.get_by_role_and_label(Role::Button, "Restart the worker").click_accesskit();
+    page.run_steps(3);
+    until(&mut page, "paused");
 }
 
 /// The runs of another worker are counted from one again: one of the same number is not that of the link.
@@ -947,6 +987,76 @@ fn a_slow_clone_can_be_shown_in_a_panel() {
     page.get_by(|node| {
         node.role() == Role::Image && says(node).is_some_and(|text| text.starts_with("Clone (bc_counts(1000000))"))
     });
+    // It tells no experts apart, and has nothing to say of them in a cell.
+    page.state_mut().as_mut().unwrap().view.cell = Some(5);
+    page.run_steps(4);
+    page.get_by_label("p(2|s)");
+    assert_eq!(page.query_all_by_label("–").count(), 2);
+}
+
+/// A clone that could not be made is not waited for.
+#[test]
+fn a_slow_clone_that_fails_leaves_its_panel_with_a_sentence() {
+    let desktop = Desktop::default();
+    let (mut page, _) = open_with(1280.0, 800.0, desktop.clone());
+    desktop.tasks_fail.set(true);
+    page.get_by_role_and_label(Role::ComboBox, "Who clones, panel 2").click_accesskit();
+    page.run_steps(3);
+    page.get_by_label_contains("bc_counts(1000000): behaviour").click_accesskit();
+    page.run_steps(12);
+    let sentence = "bc_counts(1000000) could not be made: Out of memory.";
+    page.get_by(|node| node.role() == Role::Alert && says(node).is_some_and(|text| text == sentence));
+    assert!(page.query_by(|node| says(node).is_some_and(|text| text.contains("being made"))).is_none());
+}
+
+/// A cell that another grid had and this one has not is in no link: who opens it would be refused all of it.
+#[test]
+fn a_link_has_no_cell_of_another_grid() {
+    let desktop = Desktop::default();
+    let (mut page, _) = open_with(1280.0, 800.0, desktop.clone());
+    let large = GridSpec { rows: 12, cols: 12, ..GridSpec::default() };
+    page.state_mut().as_mut().unwrap().change_world(large).unwrap();
+    settle(&mut page);
+    page.state_mut().as_mut().unwrap().view.cell = Some(140);
+    page.run_steps(60);
+    assert!(desktop.address.borrow().contains("cell=11,8"), "{}", desktop.address.borrow());
+    page.state_mut().as_mut().unwrap().load_preset(0);
+    settle(&mut page);
+    page.run_steps(60);
+    assert!(!desktop.address.borrow().contains("cell"), "{}", desktop.address.borrow());
+}
+
+/// Of a clone that remembers two of the four returns are not known: a sweep over them says so instead of showing nothing.
+#[test]
+fn a_sweep_without_figures_says_why() {
+    let (mut page, _) = open(1280.0, 800.0);
+    let observer = "gru(2)".parse().unwrap();
+    let config = Config { observer, total_steps: 8192, horizon: 20, ..Config::default() };
+    page.state_mut().as_mut().unwrap().reconfigure(config);
+    settle(&mut page);
+    go_to(&mut page, "β sweep");
+    page.get_by_role_and_label(Role::SpinButton, "Seeds of the sweep").set_value_accesskit(1.0);
+    page.run_steps(3);
+    press(&mut page, "Paper's table");
+    page.run_steps(8);
+    page.get_by_label_contains("choose within T or success");
+    page.get_by_role_and_label(Role::RadioButton, "Return: success").click_accesskit();
+    page.run_steps(4);
+    assert!(page.query_by_label_contains("choose within T or success").is_none());
+}
+
+/// A given ensemble has no curve to be saved.
+#[test]
+fn what_is_not_there_cannot_be_saved() {
+    let (mut page, _) = open(1280.0, 800.0);
+    for (preset, has_curve) in [(0, true), (6, false)] {
+        page.state_mut().as_mut().unwrap().load_preset(preset);
+        settle(&mut page);
+        press(&mut page, "Export and open");
+        let line = page.get_by_label_contains("Curve as CSV").accesskit_node().is_disabled();
+        assert_eq!(line, !has_curve);
+        press(&mut page, "Export and open");
+    }
 }
 
 /// What was wanted of a run that is gone comes no more, and its button works again.

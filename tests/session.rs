@@ -2,13 +2,14 @@
 //! The session as a page meets it: commands in, events out, at a pace. Time is a number that the test sets.
 
 use std::cell::Cell;
+use std::rc::Rc;
 
 use ape_lab::ape::{Config, Digest, EnsembleFile, Trainer};
 use ape_lab::attack::AttackerChoice;
 use ape_lab::experiment::{Course, Preset, Race, Setup, Sweep, Task};
 use ape_lab::lab::{
-    Command, Event, Exported, Link, PROTOCOL, Pace, RunState, Session, Snapshot, Started, TaskEvent, ThreadLink,
-    decode, encode, thread_pool,
+    Command, Event, Exported, Hand, Link, PROTOCOL, Pace, Pool, RunState, Session, Snapshot, Started, TaskEvent,
+    ThreadLink, decode, encode, thread_pool,
 };
 use ape_lab::mdp::{Grid, GridSpec};
 
@@ -327,6 +328,34 @@ fn the_ensemble_can_be_exported() {
     assert_eq!(exported.file.check().unwrap().1, trainer.ensemble());
 }
 
+/// Counts what it is given to begin, and does none of it.
+struct Counts(Rc<Cell<u32>>);
+
+impl Hand for Counts {
+    fn begin(&mut self, _task: &Task) {
+        self.0.set(self.0.get() + 1);
+    }
+
+    fn receive(&mut self) -> Option<Result<TaskEvent, String>> {
+        None
+    }
+
+    fn stop(&mut self) {}
+}
+
+/// Of what is cancelled together no hand begins with the next.
+#[test]
+fn what_is_cancelled_is_not_begun() {
+    let begun = Rc::new(Cell::new(0));
+    let counted = begun.clone();
+    let mut pool = Pool::new(2, move || Box::new(Counts(counted.clone())));
+    let setup = Box::new(Setup { config: short(), ..Setup::default() });
+    let ids: Vec<u32> = (0..10).map(|_| pool.begin(Task::Sweep { setup: setup.clone() })).collect();
+    assert_eq!(begun.get(), 2);
+    pool.cancel(ids[..9].iter().copied());
+    assert_eq!(begun.get(), 3);
+}
+
 /// A pool does every task once, whatever its size, and nothing of what is cancelled.
 #[test]
 fn a_pool_does_every_task_once() {
@@ -335,7 +364,7 @@ fn a_pool_does_every_task_once() {
         Sweep::setups(&setup, &[0.0, 0.5], 3).into_iter().map(|setup| Task::Sweep { setup: Box::new(setup) }).collect();
     let mut pool = thread_pool(|| ());
     let ids: Vec<u32> = tasks.iter().map(|task| pool.begin(task.clone())).collect();
-    pool.cancel(ids[2]);
+    pool.cancel([ids[2]]);
     let mut outcomes = Vec::new();
     while outcomes.len() < 5 {
         for (id, event) in pool.receive() {

@@ -248,7 +248,7 @@ fn outcomes_are_those_of_their_tasks() {
         let id = pool.begin(race.clone());
         says.borrow_mut().push_back(event);
         let news = pool.receive();
-        pool.cancel(id);
+        pool.cancel([id]);
         assert_eq!(news[0].0, id);
         news[0].1.clone()
     };

@@ -1,6 +1,6 @@
 //! Workers for long experiments: tasks wait in a queue, a hand for each core takes them.
 
-use std::collections::VecDeque;
+use std::collections::{BTreeSet, VecDeque};
 
 use super::TaskEvent;
 use crate::experiment::Task;
@@ -60,11 +60,12 @@ impl Pool {
         self.begun
     }
 
-    /// Forgets a task, done or not.
-    pub fn cancel(&mut self, id: TaskId) {
-        self.queue.retain(|(queued, _)| *queued != id);
+    /// Forgets tasks, done or not: all at once, so that no hand begins with one of them in between.
+    pub fn cancel(&mut self, ids: impl IntoIterator<Item = TaskId>) {
+        let ids: BTreeSet<TaskId> = ids.into_iter().collect();
+        self.queue.retain(|(queued, _)| !ids.contains(queued));
         for (hand, busy) in &mut self.hands {
-            if busy.as_ref().is_some_and(|(at_hand, _)| *at_hand == id) {
+            if busy.as_ref().is_some_and(|(at_hand, _)| ids.contains(at_hand)) {
                 hand.stop();
                 *busy = None;
             }

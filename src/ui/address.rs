@@ -50,7 +50,8 @@ impl App {
         }
         let Some((started, snapshot)) = self.shown() else { return encode(&pairs) };
         let cols = started.setup.grid.cols as usize;
-        if let Some(cell) = view.cell {
+        let of_controls = (setup.grid.rows * setup.grid.cols) as usize;
+        if let Some(cell) = view.cell.filter(|cell| started.setup.grid == setup.grid && *cell < of_controls) {
             put("cell", format!("{},{}", cell / cols, cell % cols));
         }
         let is_resting = matches!(snapshot.state, RunState::Paused | RunState::Finished) && !self.is_retraining();

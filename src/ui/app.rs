@@ -684,7 +684,7 @@ impl App {
             setup: Box::new(self.setup.clone()),
             recorded: snapshot.recorded,
             update: self.moment(),
-            is_playing: snapshot.state == RunState::Playing && self.view.sought.is_none(),
+            is_playing: snapshot.state == RunState::Playing && self.plays && self.view.sought.is_none(),
         })
     }
 
@@ -765,7 +765,7 @@ impl App {
         if self.view.sought == Some(snapshot.update) {
             self.view.sought = None;
         }
-        let is_resting = snapshot.state != RunState::Playing && self.begun.is_none();
+        let is_resting = snapshot.state != RunState::Playing && !self.is_retraining();
         if let Some(promise) = self.promise.filter(|_| is_resting) {
             let update = promise.update.unwrap_or(snapshot.last_update);
             if snapshot.update == update {

@@ -194,7 +194,7 @@ pub static COMMANDS: [Command; 24] = [
         help: "All four returns of ensemble and clone over training, as a table",
         icon: None,
         keys: &[],
-        can: is_shown,
+        can: App::has_curve,
         run: |app, _| app.export_curve(),
     },
     Command {

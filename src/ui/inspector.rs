@@ -77,7 +77,12 @@ pub fn show(ui: &mut Ui, panels: &[Panel], grid: &Grid, cell: Option<usize>) {
                 label(ui, row, Role::RowHeader, quiet(&format!("p({}|s)", expert + 1)));
                 for (panel, _) in &panels {
                     let text = match panel.clone {
-                        Some((_, p)) => probability(p[state * p.len() / grid.cells() + expert]),
+                        Some((_, p)) => {
+                            // As many as it has contexts: a clone that tells nobody apart has none.
+                            let here = p.chunks_exact((p.len() / grid.cells()).max(1)).nth(state);
+                            let known = here.and_then(|here| here.get(expert));
+                            known.map_or(RichText::new("–").small(), |&p| probability(p))
+                        }
                         None => RichText::new(""),
                     };
                     label(ui, row, Role::Cell, text);

@@ -21,7 +21,7 @@ impl SlowClones {
     /// Forgets them all, done or not.
     pub fn clear(&mut self, pool: &mut Pool) {
         self.made.clear();
-        self.making.drain(..).for_each(|(id, ..)| pool.cancel(id));
+        pool.cancel(self.making.drain(..).map(|(id, ..)| id));
     }
 }
 
@@ -59,8 +59,15 @@ impl App {
         match event {
             TaskEvent::Ready | TaskEvent::Progress(_) => {}
             TaskEvent::Failed(sentence) => {
-                self.slow_clones.making.remove(index);
-                self.notice = Some(sentence);
+                let (_, moment, cloner) = self.slow_clones.making.remove(index);
+                let (Some((_, snapshot)), clones) = (self.shown(), &self.view.clones) else { return };
+                if moment == (snapshot.run, snapshot.update) {
+                    // It would stand there as being made for ever; whoever chooses it again has it tried again.
+                    let left: Vec<AttackerChoice> = clones.iter().copied().filter(|other| *other != cloner).collect();
+                    let left = if left.is_empty() { App::usual_clones(self.setup.config.observer) } else { left };
+                    self.show_clones(left);
+                    self.notice = Some(format!("{cloner} could not be made: {sentence}"));
+                }
             }
             TaskEvent::Done(outcome, _) => {
                 let (_, moment, cloner) = self.slow_clones.making.remove(index);
@@ -82,7 +89,7 @@ impl App {
         self.slow_clones.made.retain(|(of, _)| *of == moment);
         self.slow_clones.making.retain(|(id, of, _)| {
             if *of != moment {
-                self.pool.cancel(*id);
+                self.pool.cancel([*id]);
             }
             *of == moment
         });

@@ -74,7 +74,7 @@ impl Batch {
     }
 
     pub fn cancel(&mut self, pool: &mut Pool, now: f64) {
-        self.tasks.iter().for_each(|(id, _)| pool.cancel(*id));
+        pool.cancel(self.tasks.iter().map(|(id, _)| *id));
         self.ended = Some(now);
     }
 

@@ -92,7 +92,10 @@ impl SweepTab {
             (true, "Pareto", "Return of the clone over that of the ensemble, a point for each β"),
         ];
         choose(ui, "Picture", &mut self.is_pareto, &options);
-        if self.is_pareto {
+        if points.is_empty() {
+            let text = "This return is not known of a clone that remembers: choose within T or success.";
+            ui.label(RichText::new(text).color(palette.warning));
+        } else if self.is_pareto {
             show_pareto(ui, &points, kind)
         } else {
             show_over_beta(ui, &points, kind)
