@@ -256,7 +256,11 @@ fn show_title(ui: &mut Ui, panel: &Panel, height: f32, view: &View, touched: &mu
             }
             let side = ui.spacing().interact_size.y;
             let width = ui.available_width() - button.map_or(0.0, |_| side + 4.0);
-            choose_cloner(ui, index, width, view, touched);
+            // A long name is cut to the room that there is.
+            let room = vec2(width.max(60.0), side);
+            ui.allocate_ui_with_layout(room, Layout::left_to_right(Align::Center), |ui| {
+                choose_cloner(ui, index, view, touched);
+            });
             match button {
                 Some(Icon::Add) if icon_button(ui, Icon::Add, "Show a second clone beside it", false).clicked() => {
                     let other = AttackerChoice::all().find(|choice| !view.clones.contains(choice));
@@ -282,7 +286,7 @@ fn show_title(ui: &mut Ui, panel: &Panel, height: f32, view: &View, touched: &mu
     });
 }
 
-fn choose_cloner(ui: &mut Ui, index: usize, width: f32, view: &View, touched: &mut Touched) {
+fn choose_cloner(ui: &mut Ui, index: usize, view: &View, touched: &mut Touched) {
     let chosen = view.clones[index];
     let name = format!("Who clones, panel {}", index + 1);
     let mut choices = AttackerChoice::usual();
@@ -292,7 +296,7 @@ fn choose_cloner(ui: &mut Ui, index: usize, width: f32, view: &View, touched: &m
     let choices: Vec<AttackerChoice> =
         choices.into_iter().filter(|choice| *choice == chosen || !view.clones.contains(choice)).collect();
     let response = ComboBox::from_id_salt(("clone", index))
-        .width(width.max(60.0))
+        .width(ui.available_width())
         .height(MENU)
         .truncate()
         .selected_text(RichText::new(chosen.to_string()).color(Palette::of(ui).clone))
