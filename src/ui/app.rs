@@ -322,8 +322,7 @@ impl App {
     pub fn send(&mut self, command: Command) {
         match command {
             Command::Load { play, .. } => self.plays = play,
-            Command::Retrain { .. } | Command::Continue { .. } => self.plays = true,
-            Command::Play => self.plays = true,
+            Command::Retrain { .. } | Command::Continue { .. } | Command::Play => self.plays = true,
             Command::Step | Command::Pause => self.plays = false,
             Command::Seen(number) => self.seen = number,
             _ => {}
