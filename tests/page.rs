@@ -859,7 +859,7 @@ fn what_is_shown_can_be_taken_away() {
         texts.collect::<Vec<_>>().join(" ").replace('\u{a0}', " ")
     };
     for said in [
-        "2 experts by PG-APE against the observer uniform (preset “Blind clone”): β = 0.60, seed 1, update 732 of 732.",
+        "2 experts by PG-APE against the observer uniform (preset “Blind clone”): β = 0.6, seed 1, update 732 of 732.",
         "Grid of 10 × 10 cells, goal in row 0, column 0, no walls, slip 0. T = 100 steps.",
         "Return, capped, in steps: ensemble −18.15, clone (uniform) −99.",
         "optimal −9.00. (−mean min(h(s), 100):",
@@ -1444,4 +1444,174 @@ fn a_world_is_drawn_and_trained_in() {
     settle(&mut page);
     let app = page.state().as_ref().unwrap();
     assert_eq!((app.setup().grid.rows, app.setup().grid.cols), (4, 10));
+}
+
+/// What was typed for one run does not go over into the next that has another value there.
+#[test]
+fn a_draft_is_gone_where_something_else_holds() {
+    let (mut page, _) = open(1280.0, 800.0);
+    page.get_by_label("Advanced").click_accesskit();
+    page.run_steps(20);
+    let field =
+        |page: &Page| page.get_by_role_and_label(Role::TextInput, "Adversary reward r̃").accesskit_node().value();
+    page.get_by_role_and_label(Role::TextInput, "Adversary reward r̃").focus();
+    page.step();
+    // Typed, taken back, and left.
+    page.event(egui::Event::Text("x".to_owned()));
+    page.run_steps(2);
+    assert!(field(&page).unwrap().contains('x'), "{:?}", field(&page));
+    page.key_press(egui::Key::Backspace);
+    page.run_steps(2);
+    assert_eq!(field(&page).as_deref(), Some("none"));
+    page.key_press(egui::Key::Enter);
+    page.run_steps(2);
+    page.state_mut().as_mut().unwrap().load_preset(4);
+    settle(&mut page);
+    let app = page.state().as_ref().unwrap();
+    assert_eq!((app.preset(), app.setup().config.adversary_reward.is_some()), (Some(4), true));
+    assert_ne!(field(&page).as_deref(), Some("none"));
+}
+
+/// A stroke ends when the button is let go, not where the pointer leaves the board.
+#[test]
+fn a_stroke_may_leave_the_board() {
+    let (mut page, here) = open(1280.0, 800.0);
+    go_to(&mut page, "World");
+    let rect = page.get_by(|node| says(node).is_some_and(|text| text.starts_with("World: row"))).rect();
+    let at = |row: f32, col: f32| rect.min + rect.size() * egui::vec2((col + 0.5) / 10.0, (row + 0.5) / 10.0);
+    let before = here.0.borrow().commands.len();
+    page.drag_at(at(6.0, 1.0));
+    page.step();
+    // It comes back where it has built already, and farther down.
+    for (row, col) in [(6.0, 0.0), (6.0, -1.0), (6.0, 0.0), (6.0, -1.0), (8.0, 0.0), (8.0, 1.0)] {
+        page.hover_at(at(row, col));
+        page.step();
+    }
+    page.drop_at(at(8.0, 1.0));
+    page.run_steps(3);
+    let desk = here.0.borrow();
+    let loads: Vec<_> = desk.commands[before..]
+        .iter()
+        .filter_map(|command| match command {
+            Command::Load { setup, .. } => Some(setup.grid.walls.clone()),
+            _ => None,
+        })
+        .collect();
+    assert_eq!(loads, [vec![(6, 0), (6, 1), (8, 0), (8, 1)]]);
+}
+
+/// A reload brings the file back with the clones that were looked at.
+#[test]
+fn a_reload_keeps_the_clones_of_a_file() {
+    let desktop = Desktop::default();
+    let (mut page, _) = open_with(1280.0, 800.0, desktop.clone());
+    let trap = (ape_lab::experiment::Preset::find("trap").unwrap().setup)().ensemble.unwrap();
+    desktop.to_open.borrow_mut().push(("mine.json".to_owned(), Ok(serde_json::to_string(&trap).unwrap())));
+    page.run_steps(2);
+    settle(&mut page);
+    page.get_by_role_and_label(Role::ComboBox, "Who clones, panel 2").click_accesskit();
+    page.run_steps(3);
+    page.get_by_label_contains("history: ").click_accesskit();
+    page.run_steps(60);
+    let clones = page.state().as_ref().unwrap().view.clones.clone();
+    let address = desktop.address.borrow().clone();
+    assert!(address.contains("file=mine.json") && address.contains("clones="), "{address}");
+    desktop.visits.borrow_mut().push(address);
+    let (mut page, _) = open_with(1280.0, 800.0, desktop.clone());
+    until(&mut page, "given");
+    assert_eq!(page.state().as_ref().unwrap().view.clones, clones);
+    assert_eq!(page.state().as_ref().unwrap().opened.as_deref(), Some("mine.json"));
+}
+
+/// Two ensembles are two, also where no digest tells them apart; the same twice is one.
+#[test]
+fn given_ensembles_are_kept_under_their_names() {
+    let desktop = Desktop::default();
+    let (mut page, _) = open_with(1280.0, 800.0, desktop.clone());
+    page.state_mut().as_mut().unwrap().load_preset(6);
+    settle(&mut page);
+    page.state_mut().as_mut().unwrap().pin();
+    let mut other = (ape_lab::experiment::Preset::find("trap").unwrap().setup)().ensemble.unwrap();
+    other.experts.reverse();
+    other.experts.truncate(1);
+    desktop.to_open.borrow_mut().push(("mine.json".to_owned(), Ok(serde_json::to_string(&other).unwrap())));
+    page.run_steps(2);
+    settle(&mut page);
+    for _ in 0..2 {
+        page.state_mut().as_mut().unwrap().pin();
+    }
+    let names: Vec<&str> = page.state().as_ref().unwrap().kept.iter().map(|kept| &*kept.name).collect();
+    assert_eq!(names, ["given: Trap", "given: mine.json"]);
+}
+
+/// Returns of different kinds are not subtracted from one another, nor drawn as if they were one.
+#[test]
+fn a_chart_mixes_no_returns() {
+    let (mut page, _) = open(1280.0, 800.0);
+    let observer = "history".parse().unwrap();
+    let config = Config { observer, ..page.state().as_ref().unwrap().setup().config.clone() };
+    page.state_mut().as_mut().unwrap().reconfigure(config);
+    settle(&mut page);
+    page.state_mut().as_mut().unwrap().pin();
+    page.run_steps(3);
+    let lines = |page: &Page, name: &str| text(page, "Chart: ").contains(name);
+    assert!(lines(&page, "clone (history, within T)") && lines(&page, "ensemble, β 0.6"), "{}", text(&page, "Chart: "));
+    assert!(!lines(&page, "J = ") && !lines(&page, "clone, β 0.6"), "{}", text(&page, "Chart: "));
+    page.get_by_role_and_label(Role::RadioButton, "Return: within T").click_accesskit();
+    page.run_steps(4);
+    assert!(lines(&page, "J = ") && lines(&page, "clone, β 0.6"), "{}", text(&page, "Chart: "));
+}
+
+/// A key moves β by its hundredth wherever it stands; a world from the palette keeps the slip.
+#[test]
+fn a_command_changes_no_more_than_it_says() {
+    let (mut page, _) = open(1280.0, 800.0);
+    page.state_mut().as_mut().unwrap().set_beta(1.5);
+    settle(&mut page);
+    page.key_press(egui::Key::ArrowUp);
+    page.run_steps(2);
+    assert_eq!(page.state().as_ref().unwrap().setup().last_beta(), 1.51);
+    let slippery = GridSpec { slip: 0.25, ..GridSpec::default() };
+    page.state_mut().as_mut().unwrap().change_world(slippery).unwrap();
+    settle(&mut page);
+    page.state_mut().as_mut().unwrap().palette.open();
+    page.run_steps(2);
+    let worlds = &ape_lab::experiment::WORLDS;
+    let world = worlds.iter().find(|world| !world.grid().walls.is_empty()).unwrap();
+    page.event(egui::Event::Text(format!("World: {}", world.title)));
+    page.run_steps(2);
+    page.key_press(egui::Key::Enter);
+    page.run_steps(4);
+    let grid = &page.state().as_ref().unwrap().setup().grid;
+    assert_eq!((grid.slip, &grid.walls), (0.25, &world.grid().walls));
+}
+
+/// Where a step's figures need a clone that the visitor has put away, it says which.
+#[test]
+fn the_lesson_says_what_it_needs() {
+    let desktop = Desktop::default();
+    for (fragment, sentence) in [
+        ("v=1&tab=learn&step=7&clones=uniform", "Both sides are of the honest clone"),
+        ("v=1&tab=learn&step=4&cell=1,1&clones=bc_counts(1000)", "Row 1, column 1. Expert 1"),
+        ("v=1&tab=learn&step=8&clones=history", "The clone (history) returns – capped, "),
+    ] {
+        desktop.visits.borrow_mut().push(fragment.to_owned());
+        let (mut page, _) = open_with(1280.0, 800.0, desktop.clone());
+        settle(&mut page);
+        page.run_steps(20);
+        text(&page, sentence);
+        assert!(page.query_by_label_contains("figures of this page").is_none(), "{fragment}");
+    }
+}
+
+/// A β of the figures is the β of the run.
+#[test]
+fn a_caption_has_beta_in_full() {
+    let desktop = Desktop::default();
+    let (mut page, _) = open_with(1280.0, 800.0, desktop.clone());
+    page.state_mut().as_mut().unwrap().set_beta(0.0625);
+    settle(&mut page);
+    page.state_mut().as_mut().unwrap().export_picture();
+    let svg = desktop.saved.borrow().last().unwrap().1.clone();
+    assert!(svg.contains("β = 0.0625,"), "{svg}");
 }

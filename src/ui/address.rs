@@ -121,7 +121,11 @@ impl App {
                 let kept = self.host.kept(FILE);
                 let text = kept.as_deref().and_then(|kept| kept.strip_prefix(&format!("{name}\n")));
                 match text.map(str::to_owned) {
-                    Some(text) => self.open(name, Ok(text)),
+                    Some(text) => {
+                        let clones = self.view.clones.clone();
+                        self.open(name, Ok(text));
+                        self.show_clones(clones);
+                    }
                     None => {
                         self.load_preset(0);
                         let sentence = format!(

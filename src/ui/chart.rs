@@ -180,7 +180,10 @@ pub fn show(ui: &mut Ui, size: Vec2, shown: &Shown, kept: &[Kept], view: &View) 
             style,
         };
         behind.push(line("ensemble", Style::Thin, &|point| (kind.get)(&point.ensemble)));
-        behind.push(line("clone", Style::Thin, &of_clone));
+        // The chart's own clone says by its name where it is within T; these have one name for both lines.
+        if kept.shown.curve.iter().all(|point| point.clone.get(view.kind).is_some()) {
+            behind.push(line("clone", Style::Thin, &of_clone));
+        }
     }
     let mut curves = vec![
         curve_of("ensemble", palette.accent, Style::Solid, &|point| (kind.get)(&point.ensemble)),
@@ -190,7 +193,7 @@ pub fn show(ui: &mut Ui, size: Vec2, shown: &Shown, kept: &[Kept], view: &View) 
     if is_denied {
         let collected = |point: &CurvePoint| point.denied.map_or(0.0, |denied| denied.clone);
         curves.push(curve_of("r̃ of the clone", palette.warning, Style::Solid, &collected));
-    } else if kind.is_steps {
+    } else if kind.is_steps && is_known {
         // Eq. 3, of this kind of return.
         curves.push(curve_of("J = ensemble − β·clone", palette.muted, Style::Dashed, &|point| {
             (kind.get)(&point.ensemble) - point.beta * of_clone(point)

@@ -7,8 +7,10 @@ use egui::{
 use super::app::{App, TABS, Tab, Wanted};
 use super::theme::Palette;
 use super::widgets::{Icon, dialog, icon_button};
+use crate::ape::Config;
 use crate::experiment::{PRESETS, WORLDS};
 use crate::lab::Command as ToSession;
+use crate::mdp::GridSpec;
 use crate::picture::COLOR_MAPS;
 
 /// A line of the table.
@@ -521,7 +523,7 @@ pub fn show_palette(ctx: &Context, app: &mut App) {
         Deed::Preset(index) => app.load_preset(index),
         Deed::World(index) => {
             let mut tab = std::mem::take(&mut app.world);
-            tab.change(app, WORLDS[index].grid());
+            tab.change(app, GridSpec { slip: app.setup().grid.slip, ..WORLDS[index].grid() });
             app.world = tab;
             app.view.tab = Tab::World;
         }
@@ -532,7 +534,7 @@ impl App {
     /// Moves β by a little, on the slider's grid.
     fn move_beta(&mut self, by: f64) {
         let beta = libm::round((self.setup().last_beta() + by) * 100.0) / 100.0;
-        self.set_beta(beta.clamp(0.0, 1.0));
+        self.set_beta(beta.clamp(0.0, Config::MAX_BETA));
     }
 }
 

@@ -7,7 +7,8 @@ use super::board::Shown;
 use super::numbers;
 use super::theme::{self, Palette};
 use super::widgets::{Icon, icon_button};
-use crate::experiment::PRESETS;
+use crate::experiment::address::shown as shorten;
+use crate::experiment::{PRESETS, Setup};
 use crate::mdp::RETURN_KINDS;
 
 /// A run that is kept as it was last seen.
@@ -31,10 +32,10 @@ impl App {
     }
 
     pub(super) fn keep(&mut self, shown: Shown) {
-        let name = name(&shown);
-        // The same moment of the same run twice says nothing.
-        self.kept.retain(|kept| kept.name != name || kept.shown.snapshot.digest != shown.snapshot.digest);
         let file = self.opened.clone().filter(|_| shown.started.setup.ensemble.is_some());
+        let name = name(&shown, file.as_deref());
+        // The same moment of the same run twice says nothing.
+        self.kept.retain(|kept| !is_same(&kept.shown, &shown));
         self.kept.push(Kept { shown, name, file });
         if self.kept.len() > MOST {
             self.kept.remove(0);
@@ -61,8 +62,17 @@ impl App {
     }
 }
 
-/// What a run is called: what it differs in from others.
-fn name(shown: &Shown) -> String {
+/// Whether both are the same moment of the same run.
+fn is_same(one: &Shown, other: &Shown) -> bool {
+    let of = |shown: &Shown| {
+        let Setup { grid, config, ensemble, .. } = shown.started.setup.clone();
+        (grid, config, ensemble, shown.snapshot.course.clone(), shown.snapshot.update)
+    };
+    of(one) == of(other)
+}
+
+/// What a run is called: what it differs in from others. A given ensemble has the name of its preset or file.
+fn name(shown: &Shown, file: Option<&str>) -> String {
     let (setup, snapshot) = (&shown.started.setup, &shown.snapshot);
     let config = &setup.config;
     let beta = snapshot.course.turns.iter().fold(numbers::short_beta(config.beta), |text, (update, beta)| {
@@ -70,7 +80,10 @@ fn name(shown: &Shown) -> String {
     });
     let beta: String = if snapshot.course.turns.len() > 3 { "β on a course".to_owned() } else { format!("β {beta}") };
     match setup.ensemble {
-        Some(_) => "given ensemble".to_owned(),
+        Some(_) => {
+            let preset = PRESETS.iter().find(|preset| (preset.setup)() == *setup).map(|preset| preset.title);
+            file.or(preset).map_or_else(|| "given ensemble".to_owned(), |name| format!("given: {}", shorten(name)))
+        }
         None => format!("{beta} · {} · n {} · seed {}", config.observer, config.experts, config.seed),
     }
 }

@@ -149,24 +149,25 @@ fn show_field(ui: &mut Ui, field: &Field, explains: bool, config: &mut Config) {
                 }
             }
             Kind::Text { get, set, expected } => {
-                // What is being typed, while it differs from what holds.
+                // What is being typed, and what held before it; where something else holds now, it is out of date.
                 let id = ui.scope_id().with(field.name);
                 let now = get(config);
-                let mut text = ui.data(|data| data.get_temp::<String>(id)).unwrap_or_else(|| now.clone());
+                let draft = ui.data(|data| data.get_temp::<(String, String)>(id)).filter(|(before, _)| *before == now);
+                let mut text = draft.map_or_else(|| now.clone(), |(_, text)| text);
                 let edit = egui::TextEdit::singleline(&mut text).desired_width(ui.available_width() - 8.0);
                 let response = ui.add(edit).accessible_name(field.label).on_hover_text(tip);
                 if response.changed() {
-                    ui.data_mut(|data| data.insert_temp(id, text.clone()));
+                    ui.data_mut(|data| data.insert_temp(id, (now.clone(), text.clone())));
                 }
                 if !response.has_focus() && text != now {
                     if set(config, text.trim()) {
-                        ui.data_mut(|data| data.remove_temp::<String>(id));
+                        ui.data_mut(|data| data.remove_temp::<(String, String)>(id));
                     } else {
                         ui.end_row();
                         let sentence = format!("{text:?}: expected {expected}.");
                         ui.label(RichText::new(sentence).small().color(palette.warning));
                         if ui.button("undo").clicked() {
-                            ui.data_mut(|data| data.remove_temp::<String>(id));
+                            ui.data_mut(|data| data.remove_temp::<(String, String)>(id));
                         }
                     }
                 }

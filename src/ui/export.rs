@@ -98,13 +98,13 @@ fn origin(shown: &Shown) -> String {
         return format!("A given ensemble of {experts}{preset}.{trained}");
     }
     let Config { beta: first, seed, alpha, .. } = setup.config;
-    let beta = numbers::decimal(snapshot.beta, if alpha.is_some() { 3 } else { 2 });
+    let beta = numbers::short_beta(snapshot.beta);
     let beta = match alpha {
         Some(alpha) => {
-            let price = numbers::decimal(alpha, 2);
+            let price = numbers::short_beta(alpha).replace('-', "−");
             format!("β = {beta} by dual ascent, for an ensemble that returns at least {price} within T")
         }
-        None if snapshot.beta != first => format!("β = {beta}, moved by hand from {}", numbers::decimal(first, 2)),
+        None if snapshot.beta != first => format!("β = {beta}, moved by hand from {}", numbers::short_beta(first)),
         None => format!("β = {beta}"),
     };
     let (update, last) = (numbers::grouped(snapshot.update), numbers::grouped(snapshot.last_update));

@@ -192,10 +192,12 @@ impl WorldTab {
 
     /// What a pointer or finger does.
     fn stroke_on(&mut self, app: &mut App, grid: &GridSpec, rect: Rect, response: &Response) {
-        let at = response.interact_pointer_pos().and_then(|at| cell_at(rect, grid, at));
-        if response.is_pointer_button_down_on()
-            && let Some(cell) = at
-        {
+        if response.is_pointer_button_down_on() {
+            // Where the pointer comes back to the board, the stroke goes on from there.
+            let Some(cell) = response.interact_pointer_pos().and_then(|at| cell_at(rect, grid, at)) else {
+                self.last = None;
+                return;
+            };
             if self.stroke.is_none() {
                 self.refusal = None;
                 self.stroke = Some(match cell {

@@ -1,5 +1,6 @@
 //! The figures of the lesson, taken from what is on the page.
 
+use crate::attack::AttackerChoice;
 use crate::lab::{CloneView, PolicyView};
 use crate::mdp::{Action, Policy, RETURN_KINDS, occupancy};
 use crate::ui::app::App;
@@ -45,9 +46,13 @@ pub fn one_cell(app: &App) -> Option<String> {
         text += &format!("Expert {}: {}. ", index + 1, likely(expert)?);
     }
     let (clone, name) = first_clone(app)?;
+    if clone.contexts.is_empty() {
+        return Some(format!("{text}Clone ({name}), which tells no experts apart: {}.", likely(&clone.view)?));
+    }
     let n = snapshot.experts.len();
-    let weights = clone.contexts.get(cell * n..(cell + 1) * n)?;
-    let weights: Vec<String> = weights
+    let weights: Vec<String> = clone
+        .contexts
+        .get(cell * n..(cell + 1) * n)?
         .iter()
         .enumerate()
         .map(|(c, p)| format!("p({}|s) = {}", c + 1, numbers::decimal(f64::from(*p), 2)))
@@ -78,7 +83,10 @@ pub fn identity(app: &App) -> Option<String> {
     if grid.cells() * horizon as usize * snapshot.experts.len() > MOST_WORK {
         return Some("This grid and T are too large to compute both sides here.".to_owned());
     }
-    let clone = snapshot.clones.iter().find(|clone| clone.cloner == crate::attack::AttackerChoice::OCCUPANCY)?;
+    if !app.view.clones.contains(&AttackerChoice::OCCUPANCY) {
+        return Some("Both sides are of the honest clone: choose “occupancy” in one of the clones’ panels.".to_owned());
+    }
+    let clone = snapshot.clones.iter().find(|clone| clone.cloner == AttackerChoice::OCCUPANCY)?;
     let n = snapshot.experts.len() as f64;
     let (mut demonstrated, mut rest) = (0.0, 0.0);
     for expert in &snapshot.experts {
@@ -111,7 +119,7 @@ pub fn capped_and_real(app: &App) -> Option<String> {
     let returns = clone.view.returns;
     Some(format!(
         "The clone ({name}) returns {} capped, {} within T, and arrives in {} of episodes.",
-        numbers::steps(returns.capped_return?),
+        returns.capped_return.map_or("–".to_owned(), numbers::steps),
         numbers::steps(returns.horizon_return),
         numbers::percent(returns.success),
     ))
