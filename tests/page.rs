@@ -1511,7 +1511,7 @@ fn a_reload_keeps_the_clones_of_a_file() {
     settle(&mut page);
     page.get_by_role_and_label(Role::ComboBox, "Who clones, panel 2").click_accesskit();
     page.run_steps(3);
-    page.get_by_label_contains("history: ").click_accesskit();
+    page.get_by_label_contains("bc_counts(1000000): behaviour").click_accesskit();
     page.run_steps(60);
     let clones = page.state().as_ref().unwrap().view.clones.clone();
     let address = desktop.address.borrow().clone();
@@ -1548,21 +1548,21 @@ fn given_ensembles_are_kept_under_their_names() {
 #[test]
 fn a_chart_mixes_no_returns() {
     let (mut page, _) = open(1280.0, 800.0);
-    let observer = "history".parse().unwrap();
-    let config = Config { observer, ..page.state().as_ref().unwrap().setup().config.clone() };
+    let observer = "gru(2)".parse().unwrap();
+    let config = Config { observer, total_steps: 8192, horizon: 20, ..Config::default() };
     page.state_mut().as_mut().unwrap().reconfigure(config);
     settle(&mut page);
     page.state_mut().as_mut().unwrap().pin();
     page.run_steps(3);
     let lines = |page: &Page, name: &str| text(page, "Chart: ").contains(name);
-    assert!(lines(&page, "clone (history, within T)") && lines(&page, "ensemble, β 0.6"), "{}", text(&page, "Chart: "));
+    assert!(lines(&page, "clone (gru(2), within T)") && lines(&page, "ensemble, β 0.6"), "{}", text(&page, "Chart: "));
     assert!(!lines(&page, "J = ") && !lines(&page, "clone, β 0.6"), "{}", text(&page, "Chart: "));
     page.get_by_role_and_label(Role::RadioButton, "Return: within T").click_accesskit();
     page.run_steps(4);
     assert!(lines(&page, "J = ") && lines(&page, "clone, β 0.6"), "{}", text(&page, "Chart: "));
 }
 
-/// A key moves β by its hundredth wherever it stands; a world from the palette keeps the slip.
+/// A key moves β by its step wherever it stands; a world from the palette keeps the slip.
 #[test]
 fn a_command_changes_no_more_than_it_says() {
     let (mut page, _) = open(1280.0, 800.0);
@@ -1570,7 +1570,7 @@ fn a_command_changes_no_more_than_it_says() {
     settle(&mut page);
     page.key_press(egui::Key::ArrowUp);
     page.run_steps(2);
-    assert_eq!(page.state().as_ref().unwrap().setup().last_beta(), 1.51);
+    assert_eq!(page.state().as_ref().unwrap().setup().last_beta(), 1.55);
     let slippery = GridSpec { slip: 0.25, ..GridSpec::default() };
     page.state_mut().as_mut().unwrap().change_world(slippery).unwrap();
     settle(&mut page);
@@ -1593,7 +1593,7 @@ fn the_lesson_says_what_it_needs() {
     for (fragment, sentence) in [
         ("v=1&tab=learn&step=7&clones=uniform", "Both sides are of the honest clone"),
         ("v=1&tab=learn&step=4&cell=1,1&clones=bc_counts(1000)", "Row 1, column 1. Expert 1"),
-        ("v=1&tab=learn&step=8&clones=history", "The clone (history) returns – capped, "),
+        ("v=1&tab=learn&step=8&clones=gru(2)", "The clone (gru(2)) returns – capped, "),
     ] {
         desktop.visits.borrow_mut().push(fragment.to_owned());
         let (mut page, _) = open_with(1280.0, 800.0, desktop.clone());
