@@ -11,7 +11,7 @@ use crate::mdp::Solver;
 pub const ATTACKER: Attacker = Attacker {
     name: "history",
     title: "remembers its episode",
-    summary: "p(c|τ) ∝ Π π_c(a|s) over its episode so far, exact Bayes. Its episodes have the ensemble's own law, so it is \
+    summary: "p(c|τ) in proportion to Π π_c(a|s) over its episode so far, exact Bayes. Its episodes have the ensemble's own law, so it is \
               as good, whatever the experts do. Exact; drawn as at the start of an episode.",
     parameter: None,
     usual: &[],

@@ -719,6 +719,9 @@ impl App {
         if let Some(started) = self.begun.take_if(|begun| begun.run == snapshot.run) {
             let past = self.past_of(&started);
             self.view.sought = None;
+            // Who pointed at the run before may have marked a cell that this grid has not.
+            let cells = snapshot.experts.first().map_or(0, |expert| expert.policy.len());
+            self.view.cell = self.view.cell.filter(|cell| *cell < cells);
             self.shown = Shown::new(started, snapshot, [past, points].concat(), self.taken);
         } else if let Some(shown) = self.shown.as_mut().filter(|shown| shown.started.run == snapshot.run) {
             shown.curve.extend(points);

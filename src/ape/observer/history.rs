@@ -7,7 +7,7 @@ use crate::mdp::{ACTIONS, Grid};
 pub const MODEL: ObserverModel = ObserverModel {
     name: "history",
     title: "remembers its episode",
-    summary: "p(c|τ) ∝ Π π_c(a|s) over the steps so far: exact Bayes. Such a clone acts by the ensemble's own \
+    summary: "p(c|τ) in proportion to Π π_c(a|s) over the steps so far: exact Bayes. Such a clone acts by the ensemble's own \
               prediction, so its episodes have the ensemble's law: it cannot be kept out.",
     parameter: None,
     learns: false,
