@@ -108,6 +108,7 @@ struct Desktop {
     address: Rc<RefCell<String>>,
     kept: Rc<RefCell<HashMap<String, String>>>,
     tasks_fail: Rc<Cell<bool>>,
+    has_no_clipboard: Rc<Cell<bool>>,
 }
 
 impl Host for Desktop {
@@ -142,6 +143,10 @@ impl Host for Desktop {
 
     fn set_address(&mut self, fragment: &str) {
         *self.address.borrow_mut() = fragment.to_owned();
+    }
+
+    fn can_copy(&self) -> bool {
+        !self.has_no_clipboard.get()
     }
 
     fn keep(&mut self, name: &str, text: &str) -> Result<(), String> {
@@ -1520,7 +1525,7 @@ fn a_reload_keeps_the_clones_of_a_file() {
     let (mut page, _) = open_with(1280.0, 800.0, desktop.clone());
     until(&mut page, "given");
     assert_eq!(page.state().as_ref().unwrap().view.clones, clones);
-    assert_eq!(page.state().as_ref().unwrap().opened.as_deref(), Some("mine.json"));
+    assert_eq!(page.state().as_ref().unwrap().opened.as_ref().map(|file| &*file.name), Some("mine.json"));
 }
 
 /// Two ensembles are two, also where no digest tells them apart; the same twice is one.
@@ -1614,4 +1619,63 @@ fn a_caption_has_beta_in_full() {
     page.state_mut().as_mut().unwrap().export_picture();
     let svg = desktop.saved.borrow().last().unwrap().1.clone();
     assert!(svg.contains("β = 0.0625,"), "{svg}");
+}
+
+/// What a link promises is on its way for long at a slow speed: what the visitor does meanwhile is in the address, too, and
+/// where they go themselves is where the next visit begins.
+#[test]
+fn an_address_follows_also_while_its_promise_is_outstanding() {
+    let desktop = Desktop::default();
+    desktop.visits.borrow_mut().push("v=1&speed=5&at=700&digest=0123456789abcdef".to_owned());
+    let (mut page, _) = open_with(1280.0, 800.0, desktop.clone());
+    until(&mut page, "training, update 2");
+    go_to(&mut page, "Race");
+    page.run_steps(20);
+    assert_eq!(*desktop.address.borrow(), "v=1&tab=race&speed=5&at=700&digest=0123456789abcdef");
+    page.state_mut().as_mut().unwrap().send(Command::Pause);
+    until(&mut page, "paused");
+    page.run_steps(20);
+    let update = page.state().as_ref().unwrap().moment();
+    let start = format!("v=1&tab=race&speed=5&at={update}&digest=");
+    let address = desktop.address.borrow().clone();
+    assert!(address.starts_with(&start) && !address.ends_with("0123456789abcdef"), "{address}");
+}
+
+/// Another file of the same name is not what a link is about.
+#[test]
+fn a_link_to_a_file_is_not_shown_with_another_of_its_name() {
+    let desktop = Desktop::default();
+    let (mut page, _) = open_with(1280.0, 800.0, desktop.clone());
+    let trap = (ape_lab::experiment::Preset::find("trap").unwrap().setup)().ensemble.unwrap();
+    let mut other = trap.clone();
+    other.experts.truncate(1);
+    let [trap, other] = [trap, other].map(|file| serde_json::to_string(&file).unwrap());
+    desktop.to_open.borrow_mut().push(("mine.json".to_owned(), Ok(trap)));
+    page.run_steps(2);
+    settle(&mut page);
+    page.run_steps(40);
+    let address = desktop.address.borrow().clone();
+    assert!(address.contains("file=mine.json&sum="), "{address}");
+    desktop.to_open.borrow_mut().push(("mine.json".to_owned(), Ok(other)));
+    page.run_steps(2);
+    settle(&mut page);
+    desktop.visits.borrow_mut().push(address);
+    page.run_steps(2);
+    text(&page, "This link shows the ensemble of mine.json, which is not in the link");
+    assert_eq!(page.state().as_ref().unwrap().preset(), Some(0));
+}
+
+/// Who cannot be given the link is told where it stands.
+#[test]
+fn a_link_is_not_said_to_be_copied_where_there_is_no_clipboard() {
+    let desktop = Desktop::default();
+    let (mut page, _) = open_with(1280.0, 800.0, desktop.clone());
+    desktop.has_no_clipboard.set(true);
+    page.key_press(egui::Key::L);
+    page.run_steps(3);
+    text(&page, "The browser lets only pages that come over https copy something. Copy the address");
+    desktop.has_no_clipboard.set(false);
+    page.key_press(egui::Key::L);
+    page.run_steps(3);
+    text(&page, "Link copied");
 }

@@ -24,16 +24,18 @@ window.addEventListener("DOMContentLoaded", () => {
     );
   }
 });
-function failLoading(reason) {
-  if (!window.pageHasStarted) failPage("The program could not be loaded (" + reason + "). Reload the page to try again.");
-}
-window.addEventListener("unhandledrejection", (event) => failLoading(event.reason));
-// Scripts that cannot be fetched say so on their own elements only: hence the capture.
+window.failLoading = (reason) => {
+  if (!window.pageHasStarted) window.failPage("The program could not be loaded (" + reason + "). Reload the page to try again.");
+};
+// Scripts that cannot be fetched say so on their own elements only: hence the capture. Those of browser extensions, and
+// what goes wrong in them, are not ours; what goes wrong in the program while it is loaded is caught in start.js.
+const isOurs = (address) => `${address}`.startsWith(location.origin + "/");
 window.addEventListener(
   "error",
   (event) => {
-    if (event.message) failLoading(event.message);
-    else if (event.target instanceof HTMLScriptElement) failLoading("a script is missing");
+    if (event.message) {
+      if (isOurs(event.filename)) window.failLoading(event.message);
+    } else if (event.target instanceof HTMLScriptElement && isOurs(event.target.src)) window.failLoading("a script is missing");
   },
   true
 );

@@ -47,6 +47,11 @@
   window.pageCanPaint = () => !hasFailed && !context?.isContextLost();
 
   window.watchGraphics = (canvas) => {
+    // That of the canvas before takes room on the graphics card, and browsers have few of them to give.
+    if (context) {
+      context.canvas.width = context.canvas.height = 1;
+      context.getExtension("WEBGL_lose_context")?.loseContext();
+    }
     context = canvas.getContext("webgl2");
   };
 

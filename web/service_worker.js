@@ -47,7 +47,8 @@ function fileOf(request) {
 }
 
 async function answer(name, request) {
-  const kept = await caches.match(new URL(name, SCOPE), { cacheName: CACHE, ignoreVary: true });
+  // Where the browser's cache is broken, the network answers.
+  const kept = await caches.match(new URL(name, SCOPE), { cacheName: CACHE, ignoreVary: true }).catch(() => undefined);
   return kept ?? fetch(request);
 }
 

@@ -6,5 +6,9 @@ window.trustedTypes?.createPolicy("default", {
 });
 
 const { program, wasm } = document.querySelector("script[data-program]").dataset;
-const { default: init } = await import(program);
-await init({ module_or_path: wasm });
+try {
+  const { default: init } = await import(program);
+  await init({ module_or_path: wasm });
+} catch (error) {
+  window.failLoading(error);
+}

@@ -17,7 +17,9 @@ mod thread;
 
 pub use link::Link;
 pub use pool::{Hand, Pool, TaskId};
-pub use protocol::{CloneView, Command, Event, Exported, PROTOCOL, PolicyView, RunState, Snapshot, Started, TaskEvent};
+pub use protocol::{
+    CloneView, Command, Event, Exported, OTHER_VERSION, PROTOCOL, PolicyView, RunState, Snapshot, Started, TaskEvent,
+};
 pub use protocol::{decode, encode};
 pub use session::{IN_FLIGHT, Pace, Session};
 #[cfg(not(target_arch = "wasm32"))]

@@ -11,7 +11,10 @@ use crate::mdp::{KnownReturns, Policy, Returns};
 
 /// Version of the messages: an old cached worker must not be taken for a new one. [`Event::Ready`] stays the
 /// first variant, so that every version can read every other's.
-pub const PROTOCOL: u32 = 7;
+pub const PROTOCOL: u32 = 8;
+
+/// What is said of a worker with another [`PROTOCOL`].
+pub const OTHER_VERSION: &str = "The worker is of another version than the page: reload the page.";
 
 /// Longest message, in bytes: the largest ensemble there can be, with its clones and its curve, takes a tenth of it.
 pub const LONGEST: usize = 16_000_000;
@@ -89,8 +92,8 @@ pub struct Exported {
 /// From a worker that does a [`crate::experiment::Task`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum TaskEvent {
-    /// The worker listens; not about a task.
-    Ready,
+    /// The worker listens; not about a task. The version of its messages is as in [`Event::Ready`].
+    Ready { protocol: u32 },
     /// How much of it is done, 0..=1.
     Progress(f32),
     /// And how many milliseconds of work it was.

@@ -2,8 +2,9 @@
 
 use egui::Context;
 
-use super::app::{App, Promise, TABS, View};
+use super::app::{App, Opened, Promise, TABS, View};
 use super::{lesson, toolbar};
+use crate::ape::Digest;
 use crate::attack::AttackerChoice;
 use crate::experiment::address::{
     AddressError, Pairs, bad, decode, encode, finish, read, read_cell, shown, take, write,
@@ -14,6 +15,8 @@ use crate::mdp::{Grid, RETURN_KINDS};
 
 /// Least time between two changes of the address, in seconds: browsers refuse more.
 const PAUSE: f64 = 0.5;
+/// Why nothing is copied where [`super::Host::can_copy`] says no.
+pub(super) const NO_CLIPBOARD: &str = "The browser lets only pages that come over https copy something.";
 /// Turns of β that a link holds.
 const MOST_TURNS: usize = 200;
 /// The file that the visitor has opened, kept over a reload: its name, and in the next line its text.
@@ -29,8 +32,9 @@ impl App {
         let mut pairs = write(&setup);
         let view = &self.view;
         let mut put = |name: &str, value: String| pairs.push((name.to_owned(), value));
-        if let Some(name) = &self.opened {
+        if let Some(Opened { name, sum }) = &self.opened {
             put("file", name.clone());
+            put("sum", sum.to_string());
         }
         let (_, tab, ..) = TABS.iter().find(|(tab, ..)| *tab == view.tab).unwrap_or(&TABS[1]);
         if *tab != "train" {
@@ -54,6 +58,12 @@ impl App {
         if let Some(cell) = view.cell.filter(|cell| started.setup.grid == setup.grid && *cell < of_controls) {
             put("cell", format!("{},{}", cell / cols, cell % cols));
         }
+        if let Some(Promise { update, digest, .. }) = self.promise.filter(|promise| promise.leads) {
+            // It is still on its way there.
+            update.iter().for_each(|update| put("at", update.to_string()));
+            digest.iter().for_each(|digest| put("digest", digest.to_string()));
+            return encode(&pairs);
+        }
         let is_resting = matches!(snapshot.state, RunState::Paused | RunState::Finished) && !self.is_retraining();
         // While it changes, the end of the run is what is linked to; so it is while something else is shown than the controls say.
         if is_resting && self.shows_controls() && setup.course.turns.len() == self.setup.course.turns.len() {
@@ -69,9 +79,8 @@ impl App {
 
     /// Puts what is on the page into the address, where that has changed and it is time.
     pub(super) fn update_address(&mut self, ctx: &Context) {
-        // Until the first run is there, or the promised moment, the address is the visitor's. While a run plays it says how
-        // to make it again.
-        if self.shown.is_none() || self.promise.is_some() {
+        // Until the first run is there the address is the visitor's. While a run plays it says how to make it again.
+        if self.shown.is_none() {
             return;
         }
         let wait = self.address.1 + PAUSE - self.now;
@@ -87,13 +96,17 @@ impl App {
 
     pub(super) fn copy_link(&mut self, ctx: &Context) {
         let link = self.host.link(&self.fragment());
+        if !self.host.can_copy() {
+            self.notice = Some(format!("{NO_CLIPBOARD} Copy the address of this page instead: it is the link."));
+            return;
+        }
         ctx.copy_text(link);
         let turns = self.setup.course.turns.len();
         self.notice = Some(match &self.opened {
             _ if turns > MOST_TURNS => format!(
                 "Link copied, but β was moved {turns} times during this run, which is more than a link holds: it opens the run without that."
             ),
-            Some(name) => format!(
+            Some(Opened { name, .. }) => format!(
                 "Link copied. The ensemble of {name} is too large for a link: whoever opens it needs the file as well."
             ),
             None => "Link copied: whoever opens it sees the same, to the last bit.".to_owned(),
@@ -117,9 +130,11 @@ impl App {
         self.is_new = false;
         match self.read_address(fragment) {
             Ok(None) => {}
-            Ok(Some(name)) => {
+            Ok(Some((name, sum))) => {
                 let kept = self.host.kept(FILE);
                 let text = kept.as_deref().and_then(|kept| kept.strip_prefix(&format!("{name}\n")));
+                // Another file may have the same name.
+                let text = text.filter(|text| sum.is_none_or(|sum| Opened::new(name.clone(), text).sum == sum));
                 match text.map(str::to_owned) {
                     Some(text) => {
                         let clones = self.view.clones.clone();
@@ -143,10 +158,11 @@ impl App {
         }
     }
 
-    /// Takes up what an address says; returns the name of the file that it is about, where there is one.
-    fn read_address(&mut self, fragment: &str) -> Result<Option<String>, AddressError> {
+    /// Takes up what an address says; returns the name of the file that it is about, where there is one, and its sum.
+    fn read_address(&mut self, fragment: &str) -> Result<Option<(String, Option<Digest>)>, AddressError> {
         let mut pairs = decode(fragment)?;
         let file = take(&mut pairs, "file");
+        let sum = read_digest(&mut pairs, "sum")?;
         // Where no more is said than which step, the step sets its own stage.
         let is_staged = pairs.iter().any(|(name, _)| name != "tab" && name != "step");
         let setup = read(&mut pairs)?;
@@ -168,8 +184,8 @@ impl App {
         self.view = view;
         self.send(Command::Speed(toolbar::SPEEDS[self.view.speed]));
         self.show_clones(clones);
-        self.promise = Some(promise).filter(|promise| *promise != Promise { update: None, digest: None });
-        Ok(file)
+        self.promise = Some(promise).filter(|promise| promise.update.is_some() || promise.digest.is_some());
+        Ok(file.map(|name| (name, sum)))
     }
 }
 
@@ -227,7 +243,7 @@ fn read_view(
 }
 
 fn read_promise(pairs: &mut Pairs, setup: &Setup) -> Result<Promise, AddressError> {
-    let mut promise = Promise { update: None, digest: None };
+    let mut promise = Promise { update: None, digest: None, leads: true };
     if let Some(value) = take(pairs, "at") {
         match value.parse() {
             _ if setup.ensemble.is_some() => {
@@ -237,11 +253,11 @@ fn read_promise(pairs: &mut Pairs, setup: &Setup) -> Result<Promise, AddressErro
             _ => return bad("at", &value, &format!("an update of the run, 0 to {}", setup.updates())),
         }
     }
-    if let Some(value) = take(pairs, "digest") {
-        match value.parse() {
-            Ok(digest) => promise.digest = Some(digest),
-            Err(_) => return bad("digest", &value, "16 hexadecimal digits"),
-        }
-    }
+    promise.digest = read_digest(pairs, "digest")?;
     Ok(promise)
+}
+
+fn read_digest(pairs: &mut Pairs, name: &str) -> Result<Option<Digest>, AddressError> {
+    let Some(value) = take(pairs, name) else { return Ok(None) };
+    value.parse().map(Some).or_else(|_| bad(name, &value, "16 hexadecimal digits"))
 }

@@ -1,5 +1,6 @@
 //! The page: what it knows, what it hears from the session, and what can be done with it. Where its parts stand is in page.rs.
 
+use std::hash::Hasher;
 use std::time::Duration;
 
 use super::board::Shown;
@@ -19,7 +20,9 @@ use crate::ape::observer::ObserverChoice;
 use crate::ape::{Config, Digest, EnsembleFile};
 use crate::attack::AttackerChoice;
 use crate::experiment::{Course, CurvePoint, Denied, PRESETS, Setup};
-use crate::lab::{Command, Event, Exported, IN_FLIGHT, Link, PROTOCOL, Pool, RunState, Snapshot, Started};
+use crate::lab::{
+    Command, Event, Exported, IN_FLIGHT, Link, OTHER_VERSION, PROTOCOL, Pool, RunState, Snapshot, Started,
+};
 use crate::mdp::GridSpec;
 
 /// What moving β does.
@@ -172,8 +175,8 @@ pub struct App {
     /// What the next ensembles from the session are for.
     wanted: Vec<Wanted>,
     pub(super) slow_clones: SlowClones,
-    /// Name of the file that the ensemble on the page was read from.
-    pub opened: Option<String>,
+    /// The file that the ensemble on the page was read from.
+    pub opened: Option<Opened>,
     /// The page's clock, in seconds.
     pub(super) now: f64,
     /// Snapshots taken in, over all sessions.
@@ -184,12 +187,30 @@ pub struct App {
     seen: u32,
 }
 
+/// A file that was opened.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Opened {
+    pub name: String,
+    /// Tells its text from that of others of its name.
+    pub sum: Digest,
+}
+
+impl Opened {
+    pub fn new(name: String, text: &str) -> Opened {
+        let mut hash = fnv::FnvHasher::default();
+        hash.write(text.as_bytes());
+        Opened { name, sum: Digest(hash.finish()) }
+    }
+}
+
 /// What an address says of the run it opens.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Promise {
     /// The moment to show; none is the end.
     pub update: Option<u32>,
     pub digest: Option<Digest>,
+    /// Whether the page goes there by itself: until the visitor goes somewhere else.
+    pub leads: bool,
 }
 
 /// Whether a run has come to the digest of the address.
@@ -323,7 +344,10 @@ impl App {
         match command {
             Command::Load { play, .. } => self.plays = play,
             Command::Retrain { .. } | Command::Continue { .. } | Command::Play => self.plays = true,
-            Command::Step | Command::Pause => self.plays = false,
+            Command::Step | Command::Pause => {
+                self.plays = false;
+                self.stop_leading();
+            }
             Command::Seen(number) => self.seen = number,
             _ => {}
         }
@@ -427,8 +451,9 @@ impl App {
                 self.preset = None;
                 self.show_clones_of(self.setup.config.observer);
                 self.load();
-                self.notice = left_out.or(self.keep_file(&name, &text.unwrap_or_default()).err());
-                self.opened = Some(name);
+                let text = text.unwrap_or_default();
+                self.notice = left_out.or(self.keep_file(&name, &text).err());
+                self.opened = Some(Opened::new(name, &text));
             }
         }
     }
@@ -478,8 +503,18 @@ impl App {
         }
     }
 
-    /// Shows another moment of the run.
+    /// Shows another moment of the run, as the visitor wishes.
     pub fn seek(&mut self, update: u32) {
+        self.stop_leading();
+        self.go_to(update);
+    }
+
+    /// What the address promises is still looked out for, but the visitor is elsewhere now.
+    fn stop_leading(&mut self) {
+        self.promise.iter_mut().for_each(|promise| promise.leads = false);
+    }
+
+    fn go_to(&mut self, update: u32) {
         let Some(shown) = &mut self.shown else { return };
         shown.remember_end();
         let update = update.min(shown.snapshot.recorded);
@@ -552,8 +587,7 @@ impl App {
                     }
                 }
                 Ok(Event::Ready { .. }) => {
-                    let sentence = "The worker is of another version than the page: reload the page.";
-                    self.session = Session::Failed(sentence.to_owned());
+                    self.session = Session::Failed(OTHER_VERSION.to_owned());
                 }
                 Ok(Event::Started(started)) => match started.check() {
                     Ok(_) => {
@@ -774,8 +808,8 @@ impl App {
                 let run = snapshot.run;
                 self.reproduced = promise.digest.map(|promised| Reproduced { run, update, promised });
                 self.promise = None;
-            } else if update <= snapshot.recorded {
-                self.seek(update);
+            } else if promise.leads && update <= snapshot.recorded {
+                self.go_to(update);
             }
         }
     }

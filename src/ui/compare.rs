@@ -2,7 +2,7 @@
 
 use egui::{Color32, Grid, RichText, Ui};
 
-use super::app::App;
+use super::app::{App, Opened};
 use super::board::Shown;
 use super::numbers;
 use super::theme::{self, Palette};
@@ -17,7 +17,7 @@ pub struct Kept {
     /// What tells it from the others.
     pub name: String,
     /// The file that its ensemble is from.
-    file: Option<String>,
+    file: Option<Opened>,
 }
 
 /// Most runs that are kept; the oldest gives way.
@@ -33,7 +33,7 @@ impl App {
 
     pub(super) fn keep(&mut self, shown: Shown) {
         let file = self.opened.clone().filter(|_| shown.started.setup.ensemble.is_some());
-        let name = name(&shown, file.as_deref());
+        let name = name(&shown, file.as_ref().map(|file| &*file.name));
         // The same moment of the same run twice says nothing.
         self.kept.retain(|kept| !is_same(&kept.shown, &shown));
         self.kept.push(Kept { shown, name, file });
@@ -49,15 +49,15 @@ impl App {
         let snapshot = &shown.snapshot;
         let mut setup = shown.started.setup.clone();
         setup.course = snapshot.course.clone();
-        let promise = super::app::Promise { update: Some(snapshot.update), digest: snapshot.digest };
+        let promise = super::app::Promise { update: Some(snapshot.update), digest: snapshot.digest, leads: true };
         let is_trained = setup.ensemble.is_none();
         let text = setup.ensemble.as_ref().and_then(|ensemble| serde_json::to_string(ensemble).ok());
         let preset = PRESETS.iter().position(|preset| (preset.setup)() == setup);
         self.begin(setup, preset);
-        if let (Some(name), Some(text)) = (&file, text) {
-            self.notice = self.keep_file(name, &text).err();
+        if let (Some(Opened { name, .. }), Some(text)) = (file, text) {
+            self.notice = self.keep_file(&name, &text).err();
+            self.opened = Some(Opened::new(name, &text));
         }
-        self.opened = file;
         self.promise = Some(promise).filter(|_| is_trained);
     }
 }

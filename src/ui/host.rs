@@ -40,6 +40,11 @@ pub trait Host {
         format!("#{fragment}")
     }
 
+    /// Whether what is copied reaches the clipboard.
+    fn can_copy(&self) -> bool {
+        true
+    }
+
     /// Keeps a text for the next visit; the error is a sentence.
     fn keep(&mut self, _name: &str, _text: &str) -> Result<(), String> {
         Ok(())

@@ -2,6 +2,7 @@
 
 use egui::{CentralPanel, Frame, Margin, RichText, ScrollArea, Ui};
 
+use super::address::NO_CLIPBOARD;
 use super::app::{App, Session, TABS, Tab, View};
 use super::board::Shown;
 use super::compare::{self, Kept};
@@ -205,7 +206,8 @@ impl App {
             let report = sentence.clone();
             match message(ui, &shown, &["Restart the worker", "Copy the report"]) {
                 Some(0) => self.restart_session(),
-                Some(_) => ui.ctx().copy_text(self.host.report(&report)),
+                Some(_) if self.host.can_copy() => ui.ctx().copy_text(self.host.report(&report)),
+                Some(_) => self.notice = Some(NO_CLIPBOARD.to_owned()),
                 None => {}
             }
         }

@@ -57,7 +57,7 @@ impl App {
     pub(super) fn take_clone(&mut self, id: TaskId, event: TaskEvent) {
         let Some(index) = self.slow_clones.making.iter().position(|(task, ..)| *task == id) else { return };
         match event {
-            TaskEvent::Ready | TaskEvent::Progress(_) => {}
+            TaskEvent::Ready { .. } | TaskEvent::Progress(_) => {}
             TaskEvent::Failed(sentence) => {
                 let (_, moment, cloner) = self.slow_clones.making.remove(index);
                 let (Some((_, snapshot)), clones) = (self.shown(), &self.view.clones) else { return };

@@ -107,6 +107,11 @@ impl Host for Files {
         self.place.link(fragment)
     }
 
+    fn can_copy(&self) -> bool {
+        // Elsewhere browsers have no clipboard for pages.
+        web_sys::window().is_some_and(|window| window.is_secure_context())
+    }
+
     fn keep(&mut self, name: &str, text: &str) -> Result<(), String> {
         let storage = storage().ok_or("This browser keeps nothing for the next visit.")?;
         storage.set_item(&key(name), text).map_err(|_| "There is no room left in this browser's storage.".to_owned())

@@ -151,8 +151,8 @@ impl Hands {
 
 fn listen<E: FromWasmAbi + 'static>(target: &Element, name: &str, heard: impl FnMut(E) + 'static) {
     let closure = Closure::<dyn FnMut(E)>::new(heard);
-    let _ = target.add_event_listener_with_callback(name, closure.as_ref().unchecked_ref());
-    closure.forget();
+    // As long as the target lives.
+    let _ = target.add_event_listener_with_callback(name, closure.into_js_value().unchecked_ref());
 }
 
 fn focus(element: &HtmlElement) {

@@ -61,15 +61,18 @@ async fn run() -> Result<(), String> {
     };
     tell("pageVersion", env!("CARGO_PKG_VERSION").into())?;
     let message = element(&document, "message")?;
-    if message.get_attribute("role").as_deref() == Some("alert") {
-        // web/failures.js has found something missing and says so.
+    let says_why = || message.get_attribute("role").as_deref() == Some("alert");
+    if says_why() {
+        // web/failures.js has found something missing.
         return Ok(());
     }
     // Whatever keeps it from telling, the version that is here starts.
     let _ = newest_version().await;
     let stage = Rc::new(Stage { runner: WebRunner::new(), app: Rc::default(), ctx: Rc::default() });
     stage.raise(&document).await?;
-    message.set_attribute("hidden", "").map_err(|error| format!("{error:?}"))?;
+    if !says_why() {
+        message.set_attribute("hidden", "").map_err(|error| format!("{error:?}"))?;
+    }
     tell("pageHasStarted", true.into())
 }
 
@@ -143,14 +146,24 @@ impl Stage {
     /// eframe nor the listeners of the old one outlive that.
     fn listen(self: Rc<Self>, canvas: &HtmlCanvasElement, document: &Document) -> Result<(), JsValue> {
         let stage = self.clone();
+        // A canvas that another has taken the place of has nothing to say.
+        let is_there = |event: &web_sys::Event| {
+            event.target().and_then(|target| target.dyn_into::<Element>().ok()).is_some_and(|it| it.is_connected())
+        };
         let on_lost = Closure::<dyn Fn(web_sys::Event)>::new(move |event: web_sys::Event| {
+            if !is_there(&event) {
+                return;
+            }
             // Otherwise the browser gives nothing back.
             event.prevent_default();
             stage.runner.destroy();
             graphics_are_lost();
         });
         let document = document.clone();
-        let on_restored = Closure::<dyn Fn()>::new(move || {
+        let on_restored = Closure::<dyn Fn(web_sys::Event)>::new(move |event: web_sys::Event| {
+            if !is_there(&event) {
+                return;
+            }
             let (stage, document) = (self.clone(), document.clone());
             wasm_bindgen_futures::spawn_local(async move {
                 let raised = match replace(&document, &["canvas", "mirror"]) {
@@ -163,12 +176,10 @@ impl Stage {
                 }
             });
         });
-        canvas.add_event_listener_with_callback("webglcontextlost", on_lost.as_ref().unchecked_ref())?;
-        canvas.add_event_listener_with_callback("webglcontextrestored", on_restored.as_ref().unchecked_ref())?;
-        // As long as the page lives.
-        on_lost.forget();
-        on_restored.forget();
-        Ok(())
+        // As long as the canvas lives.
+        let (on_lost, on_restored) = (on_lost.into_js_value(), on_restored.into_js_value());
+        canvas.add_event_listener_with_callback("webglcontextlost", on_lost.unchecked_ref())?;
+        canvas.add_event_listener_with_callback("webglcontextrestored", on_restored.unchecked_ref())
     }
 }
 

@@ -10,11 +10,11 @@ use js_sys::{Array, ArrayBuffer, Uint8Array};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use wasm_bindgen::prelude::*;
-use web_sys::{DedicatedWorkerGlobalScope, ErrorEvent, MessageChannel, MessageEvent, Worker, WorkerOptions};
+use web_sys::{DedicatedWorkerGlobalScope, MessageChannel, MessageEvent, Worker, WorkerOptions};
 
 use super::{faults, measures};
 use crate::experiment::Task;
-use crate::lab::{Command, Event, Hand, Link, PROTOCOL, Pace, Pool, Session, TaskEvent, decode, encode};
+use crate::lab::{Command, Event, Hand, Link, OTHER_VERSION, PROTOCOL, Pace, Pool, Session, TaskEvent, decode, encode};
 
 const SESSION: &str = "session";
 const TASKS: &str = "tasks";
@@ -50,7 +50,7 @@ struct Line<E> {
 
 struct Handlers {
     _on_message: Closure<dyn Fn(MessageEvent)>,
-    _on_error: Closure<dyn Fn(ErrorEvent)>,
+    _on_error: Closure<dyn Fn(web_sys::Event)>,
 }
 
 impl<E: DeserializeOwned + Debug + 'static> Line<E> {
@@ -99,11 +99,12 @@ impl<E: DeserializeOwned + Debug + 'static> Line<E> {
                 Err(other) => Err(other.as_string().unwrap_or_default()),
             });
         });
-        let on_error = Closure::<dyn Fn(ErrorEvent)>::new(move |error: ErrorEvent| {
+        let on_error = Closure::<dyn Fn(web_sys::Event)>::new(move |error: web_sys::Event| {
             error.prevent_default();
-            // A script that could not be fetched comes without a message.
-            let reason = error.message();
-            let reason = if reason.is_empty() { "its script could not be loaded".to_owned() } else { reason };
+            // A script that could not be fetched comes as a plain event, which has no message.
+            let message = js_sys::Reflect::get(&error, &"message".into()).ok().and_then(|message| message.as_string());
+            let reason = message.filter(|message| !message.is_empty());
+            let reason = reason.unwrap_or_else(|| "its script could not be loaded".to_owned());
             on_error(Err(format!("The worker has stopped ({reason}).")));
         });
         worker.set_onmessage(Some(on_message.as_ref().unchecked_ref()));
@@ -227,13 +228,15 @@ impl Hand for WorkerHand {
 
     fn receive(&mut self) -> Option<Result<TaskEvent, String>> {
         let line = self.line.as_mut()?;
-        let mut event = line.receive()?;
-        if event == Ok(TaskEvent::Ready) {
-            self.is_ready = true;
-            self.next.take().iter().for_each(|task| line.send(task));
-            event = line.receive()?;
+        match line.receive()? {
+            Ok(TaskEvent::Ready { protocol }) if protocol == PROTOCOL => {
+                self.is_ready = true;
+                self.next.take().iter().for_each(|task| line.send(task));
+                line.receive()
+            }
+            Ok(TaskEvent::Ready { .. }) => Some(Err(OTHER_VERSION.to_owned())),
+            event => Some(event),
         }
-        Some(event)
     }
 
     /// A worker at work hears nothing: it is ended, and the next task gets a new one.
@@ -287,7 +290,7 @@ fn do_tasks(scope: DedicatedWorkerGlobalScope) {
     });
     listener.set_onmessage(Some(on_message.as_ref().unchecked_ref()));
     on_message.forget();
-    post(&listener, &TaskEvent::Ready);
+    post(&listener, &TaskEvent::Ready { protocol: PROTOCOL });
 }
 
 /// Runs a session until the page ends it.

@@ -53,7 +53,7 @@ impl Batch {
                 self.tasks[index].1 = 1.0;
                 self.failure = Some(sentence.clone());
             }
-            TaskEvent::Ready => {}
+            TaskEvent::Ready { .. } => {}
         }
         if self.tasks.iter().all(|(_, part)| *part >= 1.0) && (self.failure.is_some() || self.is_complete()) {
             self.ended = self.ended.or(Some(now));
@@ -137,7 +137,7 @@ fn status(ui: &mut Ui, text: &str, live: Live) {
 /// What an ensemble from the session is called in a sentence.
 fn title_of(exported: &Exported, app: &App) -> String {
     match (&app.opened, exported.update) {
-        (Some(name), _) => name.clone(),
+        (Some(file), _) => file.name.clone(),
         (None, 0) => "the ensemble of this preset".to_owned(),
         (None, update) => format!("the ensemble after update {update}"),
     }
