@@ -10,7 +10,7 @@ use std::collections::{HashMap, VecDeque};
 use std::rc::Rc;
 
 use ape_lab::ape::EnsembleFile;
-use ape_lab::experiment::{Preset, Setup, Task};
+use ape_lab::experiment::{Preset, Setup, Task, address};
 use ape_lab::lab::{Command, Event, Hand, Link, PROTOCOL, Pool, RunState, Session, Snapshot, TaskEvent};
 use ape_lab::ui::{App, Host};
 use egui::accesskit::Role;
@@ -513,7 +513,9 @@ impl Visitor<'_> {
             "retraining, or on the way to {:?}",
             app.view.sought
         );
-        assert!(app.shows_controls(), "{:?} and {:?} for {:?}", started.setup, snapshot.course, app.setup());
+        let words = |setup: &Setup| address::encode(&address::write(setup));
+        let [shown, asked] = [&started.setup, app.setup()].map(words);
+        assert!(app.shows_controls(), "{shown} and {:?} for {asked}", snapshot.course);
         assert_eq!(app.setup().check().map_err(|error| error.to_string()), Ok(()));
         let missing: Vec<&String> = said.iter().filter(|text| text.contains("being made")).collect();
         assert!(missing.is_empty(), "{missing:?}");
@@ -584,7 +586,7 @@ fn whatever_a_visitor_does_the_page_stays_true() {
             let (_, snapshot) = visitor.app().shown().unwrap();
             let view = visitor.app().view.clone();
             let setup = visitor.app().setup().clone();
-            (setup, (snapshot.update, snapshot.digest), (view.tab, view.kind, view.clones, view.cell, view.step))
+            (address::encode(&address::write(&setup)), (snapshot.update, snapshot.digest), (view.tab, view.kind, view.clones, view.cell, view.step))
         };
         assert_eq!(seen(&other), seen(&visitor), "{address}");
         Ok(())

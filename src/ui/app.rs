@@ -459,7 +459,8 @@ impl App {
     }
 
     pub fn set_beta(&mut self, beta: f64) {
-        if beta == self.setup.last_beta() {
+        // egui's sliders obey a screen reader also where they are disabled.
+        if beta == self.setup.last_beta() || self.setup.ensemble.is_some() {
             return;
         }
         self.preset = None;
