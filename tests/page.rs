@@ -1679,3 +1679,23 @@ fn a_link_is_not_said_to_be_copied_where_there_is_no_clipboard() {
     page.run_steps(3);
     text(&page, "Link copied");
 }
+
+/// Arrow keys that come in the frame after the focus belong to the picture that has it: they do not move the focus on.
+#[test]
+fn a_picture_keeps_the_focus_from_its_first_key_on() {
+    let (mut page, _) = open(1280.0, 800.0);
+    page.state_mut().as_mut().unwrap().view.cell = Some(35);
+    page.run_steps(4);
+    let picture = |page: &Page| {
+        let is_one = |text: String| text.starts_with("Expert 1");
+        page.get_by(|node| node.role() == Role::Image && says(node).is_some_and(is_one)).is_focused()
+    };
+    page.get_by(|node| node.role() == Role::Image && says(node).is_some_and(|text| text.starts_with("Expert 1")))
+        .focus();
+    page.step();
+    for (key, cell) in [(egui::Key::ArrowDown, 45), (egui::Key::ArrowLeft, 44)] {
+        page.key_down(key);
+        page.step();
+        assert_eq!((page.state().as_ref().unwrap().view.cell, picture(&page)), (Some(cell), true));
+    }
+}

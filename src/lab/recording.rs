@@ -86,22 +86,19 @@ impl Search {
         if self.trainer.updates() < self.update {
             advance(&mut self.trainer, course);
         }
-        let has_arrived = self.trainer.updates() == self.update;
-        if has_arrived {
-            turn(&mut self.trainer, course);
-        }
-        has_arrived
+        self.trainer.updates() == self.update
     }
 }
 
-/// One update of a run with this course.
+/// One update of a run with this course; β is then as the course has it from there on.
 pub fn advance(trainer: &mut Trainer, course: &Course) {
     turn(trainer, course);
     trainer.update();
+    turn(trainer, course);
 }
 
 /// β as the course has it from this moment on.
-fn turn(trainer: &mut Trainer, course: &Course) {
+pub fn turn(trainer: &mut Trainer, course: &Course) {
     if let Some(beta) = course.turn_at(trainer.updates()) {
         trainer.set_beta(beta).expect("turns were checked when they were taken in");
     }

@@ -5,7 +5,7 @@
 
 use std::ops::RangeInclusive;
 
-use super::recording::{Recording, Search, advance};
+use super::recording::{Recording, Search, advance, turn};
 use super::{CloneView, Command, Event, Exported, PolicyView, RunState, Snapshot, Started};
 use crate::ape::{Config, Digest, Ensemble, EnsembleFile, Trainer};
 use crate::attack::{AttackerChoice, Cloned, Target, own_clone};
@@ -424,7 +424,7 @@ const NOTHING: &str = "Nothing has been loaded yet.";
 impl Run {
     /// The start of a run, if its setup is good.
     fn new(setup: Setup, is_playing: bool, is_silent: bool) -> Result<Run, String> {
-        let subject = match setup.ensemble.clone().map(EnsembleFile::check) {
+        let mut subject = match setup.ensemble.clone().map(EnsembleFile::check) {
             Some(given) => {
                 let (grid, ensemble) = given.map_err(|error| error.to_string())?;
                 setup.config.check().map_err(|error| error.to_string())?;
@@ -437,6 +437,9 @@ impl Run {
             }
         };
         setup.check().map_err(|error| error.to_string())?;
+        if let Subject::Training(trainer) = &mut subject {
+            turn(trainer, &setup.course);
+        }
         let grid = subject.grid();
         let optimal = optimal_policy(grid);
         let value = Solver::new(grid).evaluate(&optimal, setup.config.horizon);

@@ -177,6 +177,8 @@ pub struct App {
     pub(super) slow_clones: SlowClones,
     /// The file that the ensemble on the page was read from.
     pub opened: Option<Opened>,
+    /// The widget that had the keyboard's focus when the page was drawn last.
+    pub(super) focus: Option<egui::Id>,
     /// The page's clock, in seconds.
     pub(super) now: f64,
     /// Snapshots taken in, over all sessions.
@@ -274,6 +276,7 @@ impl App {
             wanted: Vec::new(),
             slow_clones: SlowClones::default(),
             opened: None,
+            focus: None,
             now: 0.0,
             taken: 0,
             undrawn: None,

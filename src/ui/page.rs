@@ -40,10 +40,16 @@ impl App {
     pub fn show(&mut self, ui: &mut Ui) {
         let before = (self.is_retraining(), self.shows_controls());
         self.draw(ui);
+        let focus = ui.ctx().memory(|memory| memory.focused());
+        // This frame is drawn once more:
         if before != (self.is_retraining(), self.shows_controls()) {
-            // What stands above what was moved is of before: this frame is drawn once more.
+            // what stands above what was moved is of before;
             ui.ctx().request_discard("the controls have moved");
+        } else if focus.is_some() && focus != self.focus {
+            // egui gives the arrow keys to who has had the focus before, and the next key may come before the next frame.
+            ui.ctx().request_discard("the focus has moved");
         }
+        self.focus = focus;
         if let Some(number) = self.undrawn.take() {
             self.send(Command::Seen(number));
         }

@@ -146,12 +146,10 @@ impl Stage {
     /// eframe nor the listeners of the old one outlive that.
     fn listen(self: Rc<Self>, canvas: &HtmlCanvasElement, document: &Document) -> Result<(), JsValue> {
         let stage = self.clone();
-        // A canvas that another has taken the place of has nothing to say.
-        let is_there = |event: &web_sys::Event| {
-            event.target().and_then(|target| target.dyn_into::<Element>().ok()).is_some_and(|it| it.is_connected())
-        };
         let on_lost = Closure::<dyn Fn(web_sys::Event)>::new(move |event: web_sys::Event| {
-            if !is_there(&event) {
+            let canvas = event.target().and_then(|target| target.dyn_into::<Element>().ok());
+            if canvas.is_none_or(|canvas| !canvas.is_connected()) {
+                // Another has taken its place, and its graphics were given back (web/faults.js).
                 return;
             }
             // Otherwise the browser gives nothing back.
@@ -160,10 +158,7 @@ impl Stage {
             graphics_are_lost();
         });
         let document = document.clone();
-        let on_restored = Closure::<dyn Fn(web_sys::Event)>::new(move |event: web_sys::Event| {
-            if !is_there(&event) {
-                return;
-            }
+        let on_restored = Closure::<dyn Fn()>::new(move || {
             let (stage, document) = (self.clone(), document.clone());
             wasm_bindgen_futures::spawn_local(async move {
                 let raised = match replace(&document, &["canvas", "mirror"]) {

@@ -5,7 +5,7 @@ import { readFile } from "node:fs/promises";
 import { fileURLToPath } from "node:url";
 import { after, before, test } from "node:test";
 import { launch, open, serve } from "./browser.mjs";
-import { PATIENCE, press, trained, until, widget } from "./visitor.mjs";
+import { PATIENCE, focus, focused, press, trained, until, widget } from "./visitor.mjs";
 
 const AXE = fileURLToPath(new URL("./node_modules/axe-core/axe.min.js", import.meta.url));
 
@@ -21,15 +21,6 @@ after(async () => {
 
 /** What a screen reader does to activate an element. */
 const activate = (locator) => locator.evaluate((element) => element.click());
-
-/** The id that the canvas says has the focus, or that of the element which has it. */
-const focused = (page) =>
-  page.evaluate(() => {
-    const active = document.activeElement;
-    const canvas = document.getElementById("canvas");
-    // Or the field beside it, into which one types.
-    return [canvas, canvas.nextElementSibling].includes(active) ? canvas.getAttribute("aria-activedescendant") : active.id;
-  });
 
 test("axe finds nothing to object to", async () => {
   const { page, close } = await open(browser, site.address);
@@ -163,9 +154,8 @@ test("a screen reader activates, focuses and moves the elements of the mirror", 
 
   // The focus goes on to the canvas, and its keys to the widget.
   const speed = widget(page, "slider", "Speed");
-  await speed.focus();
+  await focus(page, speed);
   assert.equal(await page.evaluate(() => document.activeElement.id), "canvas");
-  await until(() => focused(page), async (id) => id === (await speed.getAttribute("id")));
   await press(page, "ArrowRight");
   await until(() => speed.getAttribute("aria-valuenow"), (now) => now === "6");
   // What a swipe up on a touch screen comes to.
@@ -200,7 +190,7 @@ test("a cell's numbers are a table; everything lies where it is seen, two pixels
   assert.equal(await table.getByRole("row").count(), 9);
   // The same by keyboard: arrows move from cell to cell while a picture has the focus.
   await page.mouse.move(5, 5);
-  await page.getByRole("img", { name: /^Expert 1/ }).focus();
+  await focus(page, page.getByRole("img", { name: /^Expert 1/ }));
   await press(page, "ArrowDown");
   await press(page, "ArrowLeft");
   await page.getByRole("heading", { name: "Cell in row 4, column 4" }).waitFor(PATIENCE);

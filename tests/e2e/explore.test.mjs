@@ -2,7 +2,7 @@
 import assert from "node:assert/strict";
 import { after, before, test } from "node:test";
 import { launch, open, serve } from "./browser.mjs";
-import { PATIENCE, SHOTS, click, digest, downloaded, drawn, figure, press, says, status, trained, until, widget } from "./visitor.mjs";
+import { PATIENCE, SHOTS, click, digest, downloaded, drawn, figure, focus, press, says, status, trained, until, widget } from "./visitor.mjs";
 
 let browser, site;
 before(async () => {
@@ -122,7 +122,7 @@ test("a maze is drawn by mouse and keyboard, what spoils it is left out, and it 
   await page.screenshot({ path: SHOTS + "world-1280x800-light.png" });
   // By keyboard: the cursor stands where the last stroke began.
   await page.mouse.move(5, 5);
-  await board.evaluate((element) => element.focus());
+  await focus(page, board);
   await press(page, "ArrowDown");
   await until(() => board.getAttribute("aria-label"), (name) => name.startsWith("World: row 1, column 0, free"));
   await press(page, "Enter");

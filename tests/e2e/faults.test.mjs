@@ -253,11 +253,15 @@ test("graphics that are lost in the middle of a run, again and again, do not end
       window.loser = document.getElementById("canvas").getContext("webgl2").getExtension("WEBGL_lose_context");
       window.loser.loseContext();
     });
+    await page.evaluate(() => ((window.left ??= []).push(document.getElementById("canvas"))));
     await alert(page, "taken the page's graphics away").waitFor(PATIENCE);
     await page.evaluate(() => window.loser.restoreContext());
     await message(page).waitFor({ state: "hidden", ...PATIENCE });
   }
   await trained(page);
+  // The canvases before hold nothing on the graphics card.
+  const held = () => window.left.map((canvas) => [canvas.getContext("webgl2").isContextLost(), canvas.width, canvas.height]);
+  assert.deepEqual(await page.evaluate(held), Array(3).fill([true, 1, 1]));
   assert.equal(await digest(page), end);
   await close();
 });
@@ -388,6 +392,24 @@ for (const [how, script] of [
   });
 }
 
+test("what goes wrong in extensions while the page is loaded is not its fault", async () => {
+  const before = (page) =>
+    page.addInitScript(() => {
+      const foreign = new Error("not ours");
+      foreign.stack = "Error: not ours\n    at chrome-extension://abc/content.js:1:1";
+      addEventListener("DOMContentLoaded", () => {
+        const filename = "chrome-extension://abc/content.js";
+        dispatchEvent(new ErrorEvent("error", { message: "not ours", filename, error: foreign }));
+        dispatchEvent(new PromiseRejectionEvent("unhandledrejection", { promise: Promise.resolve(), reason: foreign }));
+      });
+    });
+  const { page, problems, close } = await open(browser, site.address, { before });
+  await trained(page);
+  assert.equal(await page.getByRole("alert").count(), 0);
+  assert.deepEqual(problems, []);
+  await close();
+});
+
 /** A file of the page as it should not come. */
 const BROKEN = {
   "cut short": (bytes) => ({ contentType: "application/wasm", body: bytes.subarray(0, bytes.length / 2) }),
@@ -419,6 +441,29 @@ for (const [how, answer] of Object.entries(BROKEN)) {
     await click(page, "button", "Restart the worker");
     await trained(page);
     assert.equal(await page.getByRole("alert").count(), 0);
+    await close();
+  });
+}
+
+for (const [how, answer] of [
+  ["cannot be fetched", (route) => route.abort()],
+  ["is missing", (route) => route.fulfill({ status: 404, contentType: "text/html", body: "<h1>Not found</h1>" })],
+]) {
+  test(`a worker whose script ${how} is said, and can be started again`, async () => {
+    const { page, close } = await open(browser, site.address, { before: (page) => page.route("**/worker_loader.js", answer) });
+    await alert(page, "its script could not be loaded").waitFor(PATIENCE);
+    assert.ok(await page.evaluate(() => window.pageCanPaint()));
+    await page.unroute("**/worker_loader.js");
+    await click(page, "button", "Restart the worker");
+    await trained(page);
+    assert.equal(await page.getByRole("alert").count(), 0);
+    // A worker of an experiment fails its task alone.
+    await page.route("**/worker_loader.js", answer);
+    await click(page, "radio", "Tab: β sweep");
+    await widget(page, "button", "Sweep").waitFor(PATIENCE);
+    await click(page, "button", "Sweep");
+    await says(page, /its script could not be loaded/);
+    assert.equal(await page.evaluate(() => window.pageCanPaint()), true);
     await close();
   });
 }

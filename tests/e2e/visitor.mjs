@@ -34,6 +34,22 @@ export async function drawn(page) {
   await until(() => page.evaluate(frames), (now) => now >= before + 4);
 }
 
+/** The id that the canvas says has the focus, or that of the element which has it. */
+export const focused = (page) =>
+  page.evaluate(() => {
+    const active = document.activeElement;
+    const canvas = document.getElementById("canvas");
+    // Or the field beside it, into which one types.
+    return [canvas, canvas.nextElementSibling].includes(active) ? canvas.getAttribute("aria-activedescendant") : active.id;
+  });
+
+/** Gives the focus to a widget by its element in the mirror; what is pressed before egui has heard of it would go elsewhere. */
+export async function focus(page, element) {
+  const id = await element.getAttribute("id");
+  await element.evaluate((one) => one.focus());
+  await until(() => focused(page), (now) => now === id);
+}
+
 /** Presses a key, and lets the page draw. */
 export async function press(page, key) {
   await page.keyboard.press(key);
@@ -45,7 +61,7 @@ export async function until(promise, condition) {
   let value;
   for (let tries = 0; tries < 300; tries++) {
     value = await promise();
-    if (condition(value)) return value;
+    if (await condition(value)) return value;
     await new Promise((resolve) => setTimeout(resolve, 100));
   }
   assert.fail(`waited for 30 seconds: ${JSON.stringify(value)}`);
