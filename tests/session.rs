@@ -253,6 +253,26 @@ fn a_changed_beta_goes_on_or_trains_anew() {
     assert_eq!(desk.last().curve.len(), 21);
 }
 
+/// At the moment of a turn β is the one that the next update takes, whether a run has played to it or is looked back at.
+#[test]
+fn a_turn_holds_from_its_moment_on() {
+    let mut desk = Desk::new();
+    let course = Course { turns: vec![(0, 0.3), (2, 0.9)], updates: None };
+    let setup = Setup { config: short(), course, ..Setup::default() };
+    desk.send(Command::Load { setup: Box::new(setup), play: false });
+    let mut betas = Vec::new();
+    for _ in 0..3 {
+        desk.run(1e3);
+        betas.push((desk.last().update, desk.last().beta));
+        desk.send(Command::Step);
+    }
+    desk.run(1e3);
+    assert_eq!(betas, [(0, 0.3), (1, 0.3), (2, 0.9)]);
+    desk.send(Command::Seek { run: desk.last().run, update: 2 });
+    desk.run(1e3);
+    assert_eq!((desk.last().update, desk.last().beta), (2, 0.9));
+}
+
 #[test]
 fn what_cannot_be_done_is_refused_and_changes_nothing() {
     let mut desk = Desk::new();
