@@ -11,7 +11,7 @@ use std::rc::Rc;
 
 use ape_lab::ape::EnsembleFile;
 use ape_lab::experiment::{Preset, Setup, Task, address};
-use ape_lab::lab::{Command, Event, Hand, Link, PROTOCOL, Pool, RunState, Session, Snapshot, TaskEvent};
+use ape_lab::lab::{Command, Event, Hand, Link, PROTOCOL, Pace, Pool, RunState, Session, Snapshot, TaskEvent};
 use ape_lab::ui::{App, Host};
 use egui::accesskit::Role;
 use egui::{Key, Modifiers, Vec2, pos2, vec2};
@@ -27,6 +27,8 @@ struct Worker {
     frame: u32,
     latency: u32,
     is_silent: bool,
+    /// Whether it would have gone on at once.
+    is_busy: bool,
     now: f64,
     commands: VecDeque<(u32, Command)>,
     events: VecDeque<(u32, Result<Event, String>)>,
@@ -45,10 +47,11 @@ impl Worker {
             self.session.handle(command);
         }
         let now = Cell::new(self.now);
-        self.session.advance(&|| {
+        let pace = self.session.advance(&|| {
             now.set(now.get() + 0.2);
             now.get()
         });
+        self.is_busy = pace == Pace::Now;
         self.now = now.get();
         let due = self.frame + self.latency;
         self.events.extend(self.session.events().into_iter().map(|event| (due, Ok(event))));
@@ -473,8 +476,8 @@ impl Visitor<'_> {
         }
         self.app_mut().view.speed = FASTEST;
         self.app_mut().send(Command::Speed(None));
-        for _ in 0..10 {
-            self.page.run_steps(40);
+        for round in 0..1000 {
+            self.page.run_steps(20);
             if !self.app().is_session_alive() {
                 self.diary.push("restarts the worker".to_owned());
                 self.page.key_press(Key::Escape);
@@ -484,21 +487,14 @@ impl Visitor<'_> {
                 self.page.get_by_label("Restart the worker").click_accesskit();
                 continue;
             }
-            let is_resting = self.app().shown().is_some_and(|(_, shown)| shown.state != RunState::Playing);
-            if is_resting && !self.app().is_retraining() && self.app().view.sought.is_none() {
+            if round == 20 {
+                // A long run is stopped on its way; one that is made again after a loss comes to where it was first.
+                self.app_mut().send(Command::Pause);
+            }
+            let worker = self.wire.0.borrow();
+            if !worker.is_busy && worker.commands.is_empty() && worker.events.is_empty() {
                 break;
             }
-        }
-        // A long run is stopped on its way.
-        if self.app().is_playing() {
-            self.app_mut().send(Command::Pause);
-        }
-        // One that is made again after a loss comes to where it was first.
-        for _ in 0..1000 {
-            if self.app().shown().is_some_and(|(_, shown)| shown.state != RunState::Playing) {
-                break;
-            }
-            self.page.run_steps(10);
         }
         self.page.run_steps(20);
     }

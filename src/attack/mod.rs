@@ -17,7 +17,7 @@ mod simulate;
 
 use serde::{Deserialize, Serialize};
 
-pub use simulate::{TRIALS, simulate};
+pub use simulate::{FEW_TRIALS, TRIALS, simulate};
 
 use crate::ape::observer::ObserverChoice;
 use crate::ape::{Choice, Contexts, Ensemble, Model, Parameter, Trainer};
@@ -62,9 +62,8 @@ impl Cloned {
 }
 
 /// The clone by a run's own observer, who has watched the training and so knows more than one that begins now. One that
-/// learns to remember is tried in a thousand episodes.
-pub fn own_clone(trainer: &mut Trainer) -> Cloned {
-    const FEW_TRIALS: usize = 1000;
+/// learns to remember is tried in so many episodes.
+pub fn own_clone(trainer: &mut Trainer, trials: usize) -> Cloned {
     let (ensemble, contexts) = (trainer.ensemble(), trainer.contexts());
     let config = trainer.config();
     let target = Target { grid: trainer.grid(), ensemble: &ensemble, horizon: config.horizon, seed: config.seed };
@@ -73,7 +72,7 @@ pub fn own_clone(trainer: &mut Trainer) -> Cloned {
         None => Cloned::mixture(&target, contexts),
         Some(_) if own.model().is_quick => own.clone_of(&target, &mut |_| true).expect("it was not told to stop"),
         Some(memory) => {
-            let tried = simulate(&target, &*memory, FEW_TRIALS, &mut |_| true);
+            let tried = simulate(&target, &*memory, trials, &mut |_| true);
             let (steps, returns) = tried.expect("it was not told to stop");
             Cloned { policy: ensemble.cloned(&contexts), contexts: Some(contexts), steps, returns, pairs: None }
         }

@@ -9,6 +9,9 @@ use crate::mdp::{ACTIONS, ActionDraw, KnownReturns, Starts};
 
 /// Episodes that a clone is tried in as a rule.
 pub const TRIALS: usize = 10_000;
+
+/// Where figures are wanted again and again, as along a curve.
+pub const FEW_TRIALS: usize = 1000;
 /// Standard errors to each side of a 95 % confidence interval.
 const NORMAL_95: f64 = 1.96;
 

@@ -5,7 +5,7 @@
 
 use crate::ape::observer::ObserverChoice;
 use crate::ape::{AlgorithmKind, Config, ConfigError, Digest, Ensemble, Trainer};
-use crate::attack::Progress;
+use crate::attack::{Progress, TRIALS, own_clone};
 use crate::mdp::{ACTIONS, Grid, Policy, Solver, optimal_policy};
 
 /// What the baselines are measured by: capped returns of the PG-APE ensemble and of its clone.
@@ -29,8 +29,14 @@ pub struct PaperRow {
     pub clone: (f64, f64),
 }
 
-/// An ensemble, and the digest of the run that it was trained in, if it was.
-pub type Made = (Ensemble, Option<Digest>);
+/// An ensemble as a method has made it.
+pub struct Made {
+    pub ensemble: Ensemble,
+    /// Of the run that it was trained in, if it was.
+    pub digest: Option<Digest>,
+    /// Capped return of the clone by that run's own observer, at the run's end.
+    pub clone: Option<f64>,
+}
 
 /// A way to come by an ensemble.
 pub struct Method {
@@ -98,7 +104,11 @@ fn train(case: &Case, algorithm: AlgorithmKind, progress: &mut Progress) -> Resu
     };
     let config = Config { algorithm, observer, ..case.config.clone() };
     let mut trainer = Trainer::new(case.grid.clone(), config)?;
-    Ok(trainer.finish(progress).then(|| (trainer.ensemble(), Some(trainer.digest()))))
+    Ok(trainer.finish(progress).then(|| Made {
+        ensemble: trainer.ensemble(),
+        digest: Some(trainer.digest()),
+        clone: own_clone(&mut trainer, TRIALS).returns.capped_return,
+    }))
 }
 
 /// A run with β = 0, stopped where `figure` of the ensemble's and the clone's capped returns comes closest to what
@@ -129,11 +139,11 @@ fn stopped_early(
         let found = figure(own, clone);
         let off = (found - wanted).abs();
         if found >= wanted || update == updates {
-            let made = (ensemble, Some(trainer.digest()));
+            let made = Made { ensemble, digest: Some(trainer.digest()), clone: None };
             let is_before_closer = last.as_ref().is_some_and(|(before, _)| *before < off);
             return Ok(Some(if is_before_closer { last.expect("just looked at").1 } else { made }));
         }
-        last = Some((off, (ensemble, Some(trainer.digest()))));
+        last = Some((off, Made { ensemble, digest: Some(trainer.digest()), clone: None }));
         trainer.update();
         if !progress(f64::from(update) / f64::from(updates)) {
             return Ok(None);
@@ -143,7 +153,7 @@ fn stopped_early(
 }
 
 fn all_alike(case: &Case, policy: Policy) -> Made {
-    (Ensemble::new(vec![policy; case.config.experts as usize]), None)
+    Made { ensemble: Ensemble::new(vec![policy; case.config.experts as usize]), digest: None, clone: None }
 }
 
 /// (1 − ε) optimal + ε uniform, with the ε that brings its capped return to the measure.

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::ape::{Digest, Trainer};
-use crate::attack::own_clone;
+use crate::attack::{FEW_TRIALS, own_clone};
 use crate::mdp::{ACTIONS, Grid, KnownReturns, Policy, RETURN_KINDS, Returns, Solver, occupancy};
 
 /// A run at one update.
@@ -30,7 +30,7 @@ pub struct Denied {
 impl CurvePoint {
     /// Evaluates a run as it stands.
     pub fn of(trainer: &mut Trainer) -> CurvePoint {
-        let own = own_clone(trainer);
+        let own = own_clone(trainer, FEW_TRIALS);
         let ensemble = trainer.ensemble();
         let (config, grid) = (trainer.config(), trainer.grid());
         let mut solver = Solver::new(grid);
@@ -57,7 +57,8 @@ impl CurvePoint {
     pub fn csv_head() -> String {
         let columns = ["ensemble", "clone"].into_iter().flat_map(|of| RETURN_KINDS.iter().map(move |kind| (of, kind)));
         let columns: Vec<String> = columns.map(|(of, kind)| format!("{of}_{}", kind.name)).collect();
-        format!("update,beta,{},ensemble_denied,clone_denied,digest", columns.join(","))
+        let columns = columns.join(",");
+        format!("update,beta,{columns},clone_horizon_error,clone_success_error,ensemble_denied,clone_denied,digest")
     }
 
     /// The point as a line of that table.
@@ -66,7 +67,9 @@ impl CurvePoint {
         let values = values.iter().flat_map(|of: &KnownReturns| (0..RETURN_KINDS.len()).map(|kind| of.get(kind)));
         let values: Vec<String> = values.map(|value| value.map_or(String::new(), |v| v.to_string())).collect();
         let denied = self.denied.map_or(",".to_owned(), |denied| format!("{},{}", denied.ensemble, denied.clone));
-        format!("{},{},{},{denied},{}", self.update, self.beta, values.join(","), self.digest)
+        let KnownReturns { horizon_error, success_error, .. } = self.clone;
+        let errors = format!("{horizon_error},{success_error}");
+        format!("{},{},{},{errors},{denied},{}", self.update, self.beta, values.join(","), self.digest)
     }
 }
 

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::baselines::PaperRow;
 use super::{Setup, Summary};
 use crate::ape::{Config, Digest, Trainer};
-use crate::attack::{AttackerChoice, Progress, Target};
+use crate::attack::{AttackerChoice, Progress, TRIALS, Target, own_clone};
 use crate::experiment::bench::ensemble_returns;
 use crate::mdp::{Grid, KnownReturns, RETURN_KINDS, Returns};
 
@@ -15,7 +15,7 @@ pub struct SweepRun {
     pub beta: f64,
     pub seed: u32,
     pub ensemble: Returns,
-    /// Of the clone by the run's own observer.
+    /// Of the clone by the run's own observer, which has watched the training.
     pub clone: KnownReturns,
     /// Of the clone that clones the demonstrations.
     pub occupancy: KnownReturns,
@@ -32,19 +32,15 @@ impl SweepRun {
             return Ok(None);
         }
         let ensemble = trainer.ensemble();
+        let own = own_clone(&mut trainer, TRIALS).returns;
         let target = Target { grid: &grid, ensemble: &ensemble, horizon: config.horizon, seed: config.seed };
-        let clone = |attacker: AttackerChoice| attacker.clone_of(&target, &mut |_| true).map(|clone| clone.returns);
-        let (Some(own), Some(occupancy)) =
-            (clone(AttackerChoice::of(config.observer)), clone(AttackerChoice::OCCUPANCY))
-        else {
-            return Ok(None);
-        };
+        let Some(occupancy) = AttackerChoice::OCCUPANCY.clone_of(&target, &mut |_| true) else { return Ok(None) };
         Ok(Some(SweepRun {
             beta: config.beta,
             seed: config.seed,
             ensemble: ensemble_returns(&grid, &ensemble, config.horizon),
             clone: own,
-            occupancy,
+            occupancy: occupancy.returns,
             digest: trainer.digest(),
         }))
     }
@@ -163,14 +159,17 @@ impl Sweep {
     pub fn csv(&self) -> String {
         let columns = ["ensemble", "clone", "occupancy"];
         let names = columns.iter().flat_map(|of| RETURN_KINDS.iter().map(move |kind| format!("{of}_{}", kind.name)));
-        let mut text = format!("beta,seed,{},digest\n", names.collect::<Vec<_>>().join(","));
+        let names = names.collect::<Vec<_>>().join(",");
+        let mut text = format!("beta,seed,{names},clone_horizon_error,clone_success_error,digest\n");
         for run in &self.runs {
             let values = [KnownReturns::from(run.ensemble), run.clone, run.occupancy];
             let values = values.iter().flat_map(|returns| {
                 (0..RETURN_KINDS.len()).map(|kind| returns.get(kind).map_or(String::new(), |value| value.to_string()))
             });
             let values: Vec<String> = values.collect();
-            text += &format!("{},{},{},{}\n", run.beta, run.seed, values.join(","), run.digest);
+            let KnownReturns { horizon_error, success_error, .. } = run.clone;
+            let values = values.join(",");
+            text += &format!("{},{},{values},{horizon_error},{success_error},{}\n", run.beta, run.seed, run.digest);
         }
         text
     }

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::baselines::{Case, METHODS, Measure};
+use super::baselines::{Case, METHODS, Made, Measure};
 use super::bench::ensemble_returns;
 use super::{Setup, Summary};
 use crate::ape::{Config, Digest};
@@ -38,15 +38,15 @@ pub fn run_seed(
     for (index, method) in METHODS.iter().enumerate() {
         let mut step = |part: f64| progress((done + part) / parts);
         let case = Case { grid: &grid, config, measure };
-        let Some((ensemble, digest)) = (method.make)(&case, &mut step).map_err(|error| error.to_string())? else {
+        let Some(Made { ensemble, digest, clone }) =
+            (method.make)(&case, &mut step).map_err(|error| error.to_string())?
+        else {
             return Ok(None);
         };
         done += 1.0;
         let returns = ensemble_returns(&grid, &ensemble, config.horizon);
         let target = Target { grid: &grid, ensemble: &ensemble, horizon: config.horizon, seed: config.seed };
         if index == 0 {
-            let clone = AttackerChoice::of(config.observer).clone_of(&target, &mut |_| true);
-            let clone = clone.and_then(|clone| clone.returns.capped_return);
             measure = clone.map(|clone| Measure { ensemble: returns.capped_return, clone });
         }
         let mut clones = Vec::with_capacity(attackers.len());

@@ -8,7 +8,7 @@ use std::ops::RangeInclusive;
 use super::recording::{Recording, Search, advance, turn};
 use super::{CloneView, Command, Event, Exported, PolicyView, RunState, Snapshot, Started};
 use crate::ape::{Config, Digest, Ensemble, EnsembleFile, Trainer};
-use crate::attack::{AttackerChoice, Cloned, Target, own_clone};
+use crate::attack::{AttackerChoice, Cloned, FEW_TRIALS, Target, own_clone};
 use crate::experiment::{Course, CurvePoint, Setup};
 use crate::mdp::{Grid, Policy, Returns, Solver, optimal_policy};
 
@@ -522,7 +522,7 @@ impl Run {
     fn own_clone(&mut self, target: &Target) -> Option<Cloned> {
         let observer = self.setup.config.observer;
         match &mut self.subject {
-            Subject::Training(trainer) => Some(own_clone(trainer)),
+            Subject::Training(trainer) => Some(own_clone(trainer, FEW_TRIALS)),
             Subject::Given { .. } => AttackerChoice::of(observer).clone_of(target, &mut |_| true),
         }
     }
