@@ -27,6 +27,11 @@ pub fn check(file: &Path) -> io::Result<()> {
     if is_device(&target) { Ok(()) } else { part(&target).map(|_| ()) }
 }
 
+/// Where a file is or would be: its folder without links and detours, and its name.
+pub fn place(file: &Path) -> Option<PathBuf> {
+    Some(folder(file).canonicalize().ok()?.join(file.file_name()?))
+}
+
 /// What is meant by a name: what it links to, or itself.
 fn target(file: &Path) -> io::Result<PathBuf> {
     let text = file.to_string_lossy();

@@ -555,3 +555,61 @@ fn bad_shards_get_one_sentence_and_are_left_alone() {
     let price = complaint(&["sweep", "--preset", "price", "--shard", "1/2", "--out", out.to_str().unwrap()]);
     assert!(price.contains("alpha -14: must be none where runs are compared") && !out.exists(), "{price}");
 }
+
+/// The clone of a sweep is that of the run's own observer, as along the run's curve; where it was simulated its interval is there.
+#[test]
+fn the_clone_of_a_sweep_is_that_of_the_run() {
+    for observer in ["replay(5)", "gru(1)"] {
+        let (curve, csv) = (file("own-curve.csv"), file("own-sweep.csv"));
+        let short = ["--total-steps", "9000", "--batch-steps", "1000", "--horizon", "20", "--observer", observer];
+        said(&[&["train", "--beta", "0.6", "--curve", curve.to_str().unwrap()], &short[..]].concat());
+        said(&[&["sweep", "--betas", "0.6", "--seeds", "1", "--out", csv.to_str().unwrap()], &short[..]].concat());
+        let last = |path: &PathBuf| {
+            let text = std::fs::read_to_string(path).unwrap();
+            let [head, last] = [text.lines().next().unwrap(), text.lines().last().unwrap()].map(|line| line.split(','));
+            head.map(str::to_owned).zip(last.map(str::to_owned)).collect::<std::collections::HashMap<_, _>>()
+        };
+        let [run, sweep] = [last(&curve), last(&csv)];
+        assert_eq!(run["digest"], sweep["digest"]);
+        let [in_run, in_sweep] = [&run, &sweep].map(|of| of["clone_horizon_return"].parse::<f64>().unwrap());
+        let [first, second] = [&run, &sweep].map(|of| of["clone_horizon_error"].parse::<f64>().unwrap());
+        // Of what is simulated a curve tries fewer episodes.
+        assert_eq!((first > 0.0, second > 0.0), (observer == "gru(1)", observer == "gru(1)"), "{observer}");
+        assert!((in_run - in_sweep).abs() <= 2.0 * (first + second), "{observer}: {in_run} {in_sweep}");
+    }
+}
+
+/// The paper's figures stand beside what they can be compared with.
+#[test]
+fn the_papers_table_stands_beside_its_like() {
+    let short = ["table1", "--seeds", "1", "--total-steps", "40000", "--exact-updates", "20", "--attackers", "bc(100)"];
+    let text = said(&short);
+    assert!(text.contains("(paper -16.24 ± 1.20)") && !text.contains("-44.27"), "{text}");
+    assert!(!said(&[&short[..], &["--beta", "0"]].concat()).contains("paper -"));
+}
+
+/// What cannot be gone on from, written, or told from another output is refused before any work.
+#[cfg(unix)]
+#[test]
+fn outputs_are_checked_before_the_work() {
+    let line = complaint(&[&SWEEP[..], &["--shard", "1/2", "--out", "/dev/null"]].concat());
+    assert!(line.contains("/dev/null: is no file, expected one that --shard can go on from"), "{line}");
+    let folder = file("outputs");
+    std::fs::create_dir_all(folder.join("inner")).unwrap();
+    let [one, other] = ["inner/../same", "same"].map(|name| folder.join(name).to_str().unwrap().to_owned());
+    let line = complaint(&["train", "--total-steps", "4000000000", "--out", &one, "--curve", &other]);
+    assert!(line.contains("which is another file of this command"), "{line}");
+    std::fs::create_dir_all(folder.join("docs/RESULTS.md")).unwrap();
+    let line = complaint(&["results", folder.join("docs").to_str().unwrap()]);
+    assert!(line.contains("RESULTS.md: is a folder, expected a file"), "{line}");
+}
+
+/// No r̃ is written as everywhere else.
+#[test]
+fn no_adversary_reward_is_none_in_a_file_too() {
+    let config = file("none.json");
+    for value in [json!("none"), Value::Null] {
+        std::fs::write(&config, json!({"adversary_reward": value, "total_steps": 9000}).to_string()).unwrap();
+        assert!(said(&["train", "--config", config.to_str().unwrap()]).contains("\"digest\""));
+    }
+}

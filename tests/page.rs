@@ -891,6 +891,7 @@ fn what_is_shown_can_be_taken_away() {
     page.get_by_label_contains("history: ").click_accesskit();
     settle(&mut page);
     let svg = &take(&mut page)[0].1;
+    assert!(!words(svg).contains("Of a clone that remembers"), "{}", words(svg));
     assert!(words(svg).contains("observer history: ") && words(svg).contains("clone (history) −"), "{}", words(svg));
     assert!(!words(svg).contains("preset") && svg.contains("stop-color=\"#ffffff\""));
 
@@ -1698,4 +1699,19 @@ fn a_picture_keeps_the_focus_from_its_first_key_on() {
         page.step();
         assert_eq!((page.state().as_ref().unwrap().view.cell, picture(&page)), (Some(cell), true));
     }
+}
+
+/// Of a clone whose hitting times are not known the picture says what its colours are.
+#[test]
+fn a_caption_says_what_the_colours_of_a_memory_are() {
+    let desktop = Desktop::default();
+    desktop.visits.borrow_mut().push("v=1&clones=uniform;history_k(1)".to_owned());
+    let (mut page, _) = open_with(1280.0, 800.0, desktop.clone());
+    settle(&mut page);
+    page.run_steps(20);
+    page.state_mut().as_mut().unwrap().export_picture();
+    let svg = desktop.saved.borrow().last().unwrap().1.clone();
+    let texts = svg.split("</text>").filter_map(|part| part.rsplit_once('>')).map(|(_, words)| words);
+    let words = texts.collect::<Vec<_>>().join(" ").replace('\u{a0}', " ");
+    assert!(words.contains("Of a clone that remembers: expected steps within T"), "{words}");
 }

@@ -2,9 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::AdversaryReward;
 use super::fields::{ConfigError, FIELDS};
 use super::observer::ObserverChoice;
+use super::{AdversaryReward, reward};
 use crate::mdp::Grid;
 
 /// How J is climbed.
@@ -84,6 +84,7 @@ pub struct Config {
     /// Updates in a whole run of exact APE, which has no steps to count (paper: none).
     pub exact_updates: u32,
     /// r̃, what the clone is to be denied instead of the experts' reward (paper: none).
+    #[serde(deserialize_with = "reward::or_none")]
     pub adversary_reward: Option<AdversaryReward>,
     /// α of Eq. 2, as a return within T: β then follows so that the ensemble's return stays at least this
     /// (paper: none).

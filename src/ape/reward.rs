@@ -3,7 +3,8 @@
 use std::fmt;
 use std::str::FromStr;
 
-use serde::{Deserialize, Serialize};
+use serde::de::Error;
+use serde::{Deserialize, Deserializer, Serialize};
 
 use crate::mdp::{ACTIONS, Action, Cell, Grid};
 
@@ -97,6 +98,12 @@ impl FromStr for AdversaryReward {
         }
         if reward == AdversaryReward::default() { Err(RewardError::term(text)) } else { Ok(reward) }
     }
+}
+
+/// Reads r̃ or, as everywhere else it is written, none.
+pub fn or_none<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<AdversaryReward>, D::Error> {
+    let text = Option::<String>::deserialize(deserializer)?.filter(|text| text != "none");
+    text.map(|text| text.parse().map_err(D::Error::custom)).transpose()
 }
 
 impl TryFrom<String> for AdversaryReward {

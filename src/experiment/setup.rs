@@ -104,6 +104,12 @@ impl Setup {
         (&self.grid, experts, horizon) == (&GridSpec::default(), 2, HORIZON)
     }
 
+    /// Whether the paper's Table 1 is of the same, and of this β.
+    pub fn is_papers_table(&self) -> bool {
+        let Config { beta, adversary_reward, .. } = &self.config;
+        self.is_papers() && *beta == Config::paper().beta && adversary_reward.is_none()
+    }
+
     /// Reads a configuration file: the fields of [`Config`], alone or as `config`, with a `grid` where it is not the
     /// paper's. An ensemble file does too: its `grid` and `config` are taken.
     pub fn parse(text: &str) -> Result<Setup, SetupError> {

@@ -7,7 +7,7 @@ use super::numbers;
 use super::panels;
 use crate::ape::{AlgorithmKind, Config, FIELDS};
 use crate::experiment::{CurvePoint, PRESETS, Setup};
-use crate::lab::RunState;
+use crate::lab::{CloneView, RunState};
 use crate::mdp::{CAP, Grid, KnownReturns, Policy, RETURN_KINDS, transition_model};
 use crate::picture::{self, COLOR_MAPS, heatmaps};
 
@@ -65,7 +65,7 @@ pub fn picture(shown: &Shown, view: &View) -> String {
     let caption = [
         format!("{} {}", origin(shown), ground(shown)),
         returns(shown, view),
-        format!("{} {}", legend(shown), source(shown)),
+        format!("{} {}", legend(shown, view), source(shown)),
     ];
     heatmaps(shown.grid(), &panels, &COLOR_MAPS[view.color_map], &caption)
 }
@@ -179,10 +179,15 @@ fn returns(shown: &Shown, view: &View) -> String {
 }
 
 /// How the heat maps are read.
-fn legend(shown: &Shown) -> String {
+fn legend(shown: &Shown, view: &View) -> String {
     let mut legend = format!(
         "Colour: expected steps to the flag, cut at {CAP}. Length of an arrow: probability of the move; dot: of Stay."
     );
+    let is_within_t =
+        |clone: &CloneView| view.clones.contains(&clone.cloner) && clone.view.returns.capped_return.is_none();
+    if shown.snapshot.clones.iter().any(is_within_t) {
+        legend += " Of a clone that remembers: expected steps within T, from the start of an episode.";
+    }
     if shown.grid().free_cells() < shown.grid().cells() {
         legend += " Struck through: walls.";
     }

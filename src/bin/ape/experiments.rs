@@ -9,6 +9,7 @@ use std::time::Instant;
 use ape_lab::ape::EnsembleFile;
 use ape_lab::attack::AttackerChoice;
 use ape_lab::experiment::{Bench, METHODS, Outcome, Setup, Summary, Sweep, Table1, Task, ensemble_returns};
+use ape_lab::files;
 use ape_lab::mdp::RETURN_KINDS;
 use clap::{Arg, ArgAction, ArgMatches, Command};
 use rayon::prelude::*;
@@ -243,7 +244,7 @@ pub fn table1(matches: &ArgMatches) -> Result<(), String> {
         );
         let with_paper = |value: Option<(f64, f64)>| {
             value
-                .filter(|_| kind == 0 && setup.is_papers())
+                .filter(|_| kind == 0 && setup.is_papers_table())
                 .map_or(String::new(), |(mean, sd)| format!("  (paper {mean:.2} ± {sd:.2})"))
         };
         for row in table.rows(kind) {
@@ -253,7 +254,8 @@ pub fn table1(matches: &ArgMatches) -> Result<(), String> {
             say!("  {:<18} {}{}", "ensemble", shown(&row.ensemble), with_paper(paper.map(|paper| paper.ensemble)));
             for (attacker, clone) in table.attackers.iter().zip(&row.clones) {
                 let Some(clone) = clone else { continue };
-                let bc = attacker.model().name == "bc";
+                // The paper's clone is of a million pairs.
+                let bc = attacker.model().name == "bc" && attacker.parameter() == 1_000_000;
                 say!(
                     "  {:<18} {}{}",
                     attacker.to_string(),
@@ -314,6 +316,10 @@ pub fn results(matches: &ArgMatches) -> Result<(), String> {
     let folder = Path::new(matches.get_one::<String>("folder").expect("it has a default"));
     let pictures = folder.join("results");
     std::fs::create_dir_all(&pictures).map_err(|error| format!("{}: {error}", pictures.display()))?;
+    // What cannot be written is found out before all the work.
+    for file in [folder.join("RESULTS.md"), pictures.join("pg-ape.svg")] {
+        files::check(&file).map_err(|error| format!("{}: {error}", file.display()))?;
+    }
     let files = ape_lab::report::results(&|tasks| run_all(tasks))?;
     for (name, text) in &files {
         let path = folder.join(name);

@@ -173,7 +173,8 @@ fn check_out(matches: &ArgMatches, flags: &[&str]) -> Result<(), String> {
     let same = |one: &str, other: &str| match (Path::new(one).canonicalize(), Path::new(other).canonicalize()) {
         // A device takes any number of texts.
         (Ok(one), Ok(other)) => one == other && one.is_file(),
-        _ => std::path::absolute(one).ok() == std::path::absolute(other).ok(),
+        // Whatever way leads to its folder.
+        _ => files::place(one.as_ref()).is_some_and(|place| Some(place) == files::place(other.as_ref())),
     };
     let mut taken: Vec<&String> = ["file", "files", "config"].into_iter().flat_map(given).collect();
     for flag in flags {

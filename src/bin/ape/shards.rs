@@ -45,6 +45,9 @@ pub fn sweep(matches: &ArgMatches, which: &str, setup: &Setup, betas: Vec<f64>, 
     let plan = SweepPlan::new(setup, betas, seeds).map_err(|error| error.to_string())?;
     let mut shard = Shard::new(plan, which).map_err(flag)?;
     if std::fs::exists(file).map_err(|error| format!("{file}: {error}"))? {
+        if !std::path::Path::new(file).is_file() {
+            return Err(format!("--out {file}: is no file, expected one that --shard can go on from"));
+        }
         let is_kept = |sentence: String| format!("{sentence}; the file is left as it is");
         let earlier = read_shard(file).map_err(is_kept)?;
         shard.resume(earlier).map_err(|error| is_kept(format!("{file}: {error}")))?;

@@ -43,7 +43,7 @@ impl Table1Tab {
             let is_running = self.batch.as_ref().is_some_and(Batch::is_running);
             if ui.add_enabled(!is_running, egui::Button::new("Make Table 1")).clicked() {
                 let setup = Setup { ensemble: None, ..app.setup().clone() };
-                self.is_papers = setup.is_papers();
+                self.is_papers = setup.is_papers_table();
                 self.columns = self.cloners.clone();
                 let task = |setup| Task::Table1 { setup: Box::new(setup), attackers: self.columns.clone() };
                 let tasks = Table1::setups(&setup, self.seeds).into_iter().map(task).collect();
