@@ -474,6 +474,8 @@ impl Visitor<'_> {
             let worker = &mut *self.wire.0.borrow_mut();
             (worker.is_silent, worker.latency) = (false, 0);
         }
+        // What is being dragged still moves.
+        self.page.run_steps(4);
         self.app_mut().view.speed = FASTEST;
         self.app_mut().send(Command::Speed(None));
         for round in 0..1000 {
@@ -492,7 +494,8 @@ impl Visitor<'_> {
                 self.app_mut().send(Command::Pause);
             }
             let worker = self.wire.0.borrow();
-            if !worker.is_busy && worker.commands.is_empty() && worker.events.is_empty() {
+            let is_playing = self.app().shown().is_some_and(|(_, shown)| shown.state == RunState::Playing);
+            if !is_playing && !worker.is_busy && worker.commands.is_empty() && worker.events.is_empty() {
                 break;
             }
         }

@@ -86,7 +86,12 @@ impl Search {
         if self.trainer.updates() < self.update {
             advance(&mut self.trainer, course);
         }
-        self.trainer.updates() == self.update
+        let has_arrived = self.trainer.updates() == self.update;
+        if has_arrived {
+            // The copy may be from before β was moved here.
+            turn(&mut self.trainer, course);
+        }
+        has_arrived
     }
 }
 

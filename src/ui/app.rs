@@ -797,7 +797,8 @@ impl App {
     fn follow(&mut self) {
         let Some(Shown { snapshot, started, .. }) = &self.shown else { return };
         self.continued = self.continued.filter(|(_, last)| snapshot.number <= *last);
-        let is_older = self.continued.is_some_and(|(beta, _)| snapshot.beta != beta);
+        let last_beta = snapshot.course.turns.last().map(|(_, beta)| *beta);
+        let is_older = self.continued.is_some_and(|(beta, _)| last_beta != Some(beta));
         // Unless the controls have gone on to another run, or to another β.
         if !self.is_retraining() && !is_older && self.is_of_controls(started) {
             self.setup.course = snapshot.course.clone();

@@ -54,7 +54,9 @@ impl App {
         let text = setup.ensemble.as_ref().and_then(|ensemble| serde_json::to_string(ensemble).ok());
         let preset = PRESETS.iter().position(|preset| (preset.setup)() == setup);
         self.begin(setup, preset);
-        if let (Some(Opened { name, .. }), Some(text)) = (file, text) {
+        // Where another run was on its way when it was kept, the name of its file was gone.
+        let name = file.map(|file| file.name).or(preset.is_none().then(|| "ape-ensemble.json".to_owned()));
+        if let (Some(name), Some(text)) = (name, text) {
             self.notice = self.keep_file(&name, &text).err();
             self.opened = Some(Opened::new(name, &text));
         }
