@@ -5,9 +5,9 @@ use std::sync::LazyLock;
 
 use ape_lab::ape::observer::Posterior;
 use ape_lab::ape::{Config, Ensemble, Trainer};
-use ape_lab::attack::{AttackerChoice, Cloned, TRIALS, Target, simulate};
+use ape_lab::attack::{AttackerChoice, Cloned, TRIALS, Target, own_clone, simulate};
 use ape_lab::experiment::{Preset, ensemble_returns};
-use ape_lab::mdp::{ACTIONS, Grid, GridSpec, Policy, Starts, occupancy};
+use ape_lab::mdp::{ACTIONS, Grid, GridSpec, KnownReturns, Policy, Starts, occupancy};
 use rand::{Rng, RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
@@ -275,4 +275,76 @@ fn attacks_repeat_and_stop() {
         let target = Target { grid: &grid, ensemble: &ensemble, horizon: T, seed: 1 };
         assert!(cloner.clone_of(&target, &mut |_| false).is_none());
     }
+}
+
+/// The clone by a run's own observer is made of what that one has watched, and evaluated within the run's T.
+#[test]
+fn a_runs_own_clone_is_of_its_own_observer() {
+    for observer in ["uniform", "replay(3)"] {
+        let observer = observer.parse().unwrap();
+        let config = Config { observer, horizon: 15, total_steps: 9000, ..Config::default() };
+        let mut trainer = Trainer::new(GRID.clone(), config).unwrap();
+        (0..2).for_each(|_| trainer.update());
+        let own = own_clone(&mut trainer, 10);
+        let (ensemble, contexts) = (trainer.ensemble(), trainer.contexts());
+        let target = Target { grid: &GRID, ensemble: &ensemble, horizon: 15, seed: 1 };
+        assert!(own == Cloned::mixture(&target, contexts), "{observer}");
+    }
+}
+
+/// The interval of what was played: a proportion's for success, the rule of three where all arrive, and there is one
+/// however few episodes are played.
+#[test]
+fn the_interval_of_success_is_that_of_a_proportion() {
+    // Episodes begin in one cell only, so that all of them count for one proportion.
+    let spec = GridSpec { rows: 2, cols: 2, goal: (0, 0), walls: vec![(0, 1), (1, 1)], slip: 0.0 };
+    let grid = Grid::new(spec).unwrap();
+    let ensemble = random_ensemble(&grid, 2, 8);
+    let play = |horizon: u32, trials: usize| {
+        let target = Target { grid: &grid, ensemble: &ensemble, horizon, seed: 4 };
+        simulate(&target, &Posterior::new(&ensemble), trials, &mut |_| true).unwrap().1
+    };
+    let KnownReturns { success: p, success_error, .. } = play(1, 1000);
+    assert!(p > 0.02 && p < 0.98, "{p}");
+    assert!((success_error - 1.96 * (p * (1.0 - p) / 999.0).sqrt()).abs() < 1e-12, "{p} {success_error}");
+    let all = play(10_000, 1000);
+    assert_eq!((all.success, all.success_error), (1.0, 3.0 / 1000.0));
+    let few = play(5, 1);
+    assert!(few.horizon_error.is_finite() && few.success_error.is_finite(), "{few:?}");
+    // Told to stop, it has no figures.
+    let target = Target { grid: &grid, ensemble: &ensemble, horizon: 5, seed: 4 };
+    let mut calls = 0;
+    let mut once = |_: f64| {
+        calls += 1;
+        calls < 3
+    };
+    assert!(simulate(&target, &Posterior::new(&ensemble), 1000, &mut once).is_none());
+}
+
+/// What learns says of how many pairs it was made; a cell that was seen once is cloned as it was seen.
+#[test]
+fn pairs_are_counted() {
+    let pairs = |name: &str| attack(name, &GRID, &BLIND, T).pairs;
+    assert_eq!([pairs("bc(100)"), pairs("bc_counts(1)"), pairs("occupancy")], [Some(100), Some(1), None]);
+    let small = Grid::new(GridSpec { rows: 3, cols: 3, ..GridSpec::default() }).unwrap();
+    assert!(attack("gru(1)", &small, &random_ensemble(&small, 2, 1), 10).pairs > Some(1000));
+    let once = attack("bc_counts(1)", &GRID, &BLIND, T).policy;
+    let seen = once.rows().iter().filter(|row| row.contains(&1.0)).count();
+    let unseen = once.rows().iter().filter(|row| **row == [0.2; ACTIONS]).count();
+    assert_eq!((seen, unseen), (1, 99));
+}
+
+/// What a clone with a memory is drawn and run with.
+#[test]
+fn clones_that_remember_say_so_and_take_their_time() {
+    let of = |name: &str| name.parse::<AttackerChoice>().unwrap();
+    for name in ["history_k(1)", "history", "gru(4)"] {
+        assert!(of(name).model().remembers, "{name}");
+    }
+    assert!(of("history_k(3)").is_quick(100, 100) && !of("history_k(3)").is_quick(1024, 10_000));
+    assert!(of("history_k(1)").is_quick(1024, 1000));
+    let steps = attack("history", &GRID, &BLIND, T).steps;
+    let mean = GRID.starts().iter().map(|&start| steps[start as usize].min(100.0)).sum::<f64>() / 100.0;
+    let own = ensemble_returns(&GRID, &BLIND, T).capped_return;
+    assert!((mean + own).abs() < 1e-6, "{mean} {own}");
 }
