@@ -342,9 +342,20 @@ fn clones_that_remember_say_so_and_take_their_time() {
         assert!(of(name).model().remembers, "{name}");
     }
     assert!(of("history_k(3)").is_quick(100, 100) && !of("history_k(3)").is_quick(1024, 10_000));
-    assert!(of("history_k(1)").is_quick(1024, 1000));
+    assert!(of("history_k(1)").is_quick(1024, 1000) && !of("history_k(3)").is_quick(400, 1000));
     let steps = attack("history", &GRID, &BLIND, T).steps;
     let mean = GRID.starts().iter().map(|&start| steps[start as usize].min(100.0)).sum::<f64>() / 100.0;
     let own = ensemble_returns(&GRID, &BLIND, T).capped_return;
     assert!((mean + own).abs() < 1e-6, "{mean} {own}");
+}
+
+/// Where every episode arrives nothing is dropped: `filtered` is `occupancy`, in p(c|s) too.
+#[test]
+fn without_failures_filtered_is_occupancy() {
+    let [filtered, occupancy] = ["filtered", "occupancy"].map(|name| attack(name, &GRID, &BLIND, 2000));
+    let [filtered, occupancy] = [filtered, occupancy].map(|clone| clone.contexts.unwrap());
+    for &start in GRID.starts() {
+        let rows = filtered.row(start as usize).iter().zip(occupancy.row(start as usize));
+        rows.for_each(|(a, b)| assert!((a - b).abs() < 1e-9, "{start}: {a} {b}"));
+    }
 }
