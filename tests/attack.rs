@@ -347,6 +347,12 @@ fn clones_that_remember_say_so_and_take_their_time() {
     let mean = GRID.starts().iter().map(|&start| steps[start as usize].min(100.0)).sum::<f64>() / 100.0;
     let own = ensemble_returns(&GRID, &BLIND, T).capped_return;
     assert!((mean + own).abs() < 1e-6, "{mean} {own}");
+    // Its capped return is that of its own hitting times, which are means over experts, some of them lost.
+    let lost = Policy::from_rows(vec![[1.0 / ACTIONS as f64; ACTIONS]; GRID.cells()]);
+    let ensemble = Ensemble::new(vec![BLIND.policies()[0].clone(), lost]);
+    let lost = attack("history", &GRID, &ensemble, T);
+    let mean = GRID.starts().iter().map(|&start| lost.steps[start as usize].min(100.0)).sum::<f64>() / 100.0;
+    assert!((mean + lost.returns.capped_return.unwrap()).abs() < 1e-6, "{mean} {:?}", lost.returns);
 }
 
 /// Where every episode arrives nothing is dropped: `filtered` is `occupancy`, in p(c|s) too.

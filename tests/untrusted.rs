@@ -6,11 +6,11 @@ use std::cell::RefCell;
 use std::collections::VecDeque;
 use std::rc::Rc;
 
-use ape_lab::ape::{Config, EnsembleFile, Trainer};
+use ape_lab::ape::{Config, EnsembleFile, GradientKind, Trainer};
 use ape_lab::attack::AttackerChoice;
 use ape_lab::experiment::{Course, Outcome, Preset, Race, Setup, Shard, Task};
 use ape_lab::lab::{Command, Event, Hand, Pool, Session, Snapshot, Started, TaskEvent, decode, encode};
-use ape_lab::mdp::{Grid, GridSpec};
+use ape_lab::mdp::{Grid, GridSpec, KnownReturns};
 
 fn small() -> Setup {
     let grid = GridSpec { rows: 2, cols: 3, ..GridSpec::default() };
@@ -258,4 +258,57 @@ fn outcomes_are_those_of_their_tasks() {
     assert!(matches!(answer(TaskEvent::Done(Box::new(lost), 1.0)), TaskEvent::Failed(_)));
     assert!(matches!(answer(TaskEvent::Done(Box::new(attacked), 1.0)), TaskEvent::Failed(_)));
     assert!(matches!(answer(TaskEvent::Done(Box::new(raced), f64::NAN)), TaskEvent::Failed(_)));
+}
+
+/// What a file or message says of a world, a policy or its figures is what there can be.
+#[test]
+fn what_cannot_be_is_not_taken() {
+    for slip in [-0.5, 1.0, f64::NAN] {
+        assert!(Grid::new(GridSpec { slip, ..GridSpec::default() }).is_err(), "{slip}");
+    }
+    let spec = GridSpec { rows: 2, cols: 2, goal: (0, 0), walls: vec![(1, 1)], slip: 0.0 };
+    let file = |rows: [[f64; 5]; 4], experts: usize| EnsembleFile {
+        grid: spec.clone(),
+        experts: vec![rows.to_vec(); experts],
+        ..trap().ensemble.unwrap()
+    };
+    let [up, left] = [[1.0, 0.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0, 0.0]];
+    // Of the wall nothing counts, and it is as any other afterwards.
+    let good = file([up, left, up, [9.0, -1.0, 0.0, 0.0, 0.0]], 8);
+    let (_, ensemble) = good.check().unwrap();
+    assert_eq!(ensemble.policies()[0].row(3), &[0.2; 5]);
+    for rows in [[up, left.map(|p| p / 2.0), up, up], [up, [0.0; 5], up, up]] {
+        assert!(file(rows, 2).check().is_err());
+    }
+    assert!(file([up, left, up, up], 9).check().is_err());
+    let returns = KnownReturns {
+        capped_return: None,
+        uncapped_return: None,
+        horizon_return: -5.0,
+        success: 0.5,
+        horizon_error: 0.1,
+        success_error: 0.1,
+    };
+    assert!(returns.check().is_ok());
+    for wrong in [
+        KnownReturns { horizon_return: 1.0, ..returns },
+        KnownReturns { uncapped_return: Some(1e300), ..returns },
+        KnownReturns { success: 1.1, ..returns },
+        KnownReturns { horizon_error: -1.0, ..returns },
+    ] {
+        assert!(wrong.check().is_err(), "{wrong:?}");
+    }
+}
+
+/// A mixture's gradient has no formula for a clone that remembers; and after its end a run's bonus on entropy stays as it is.
+#[test]
+fn a_configuration_holds_also_past_its_end() {
+    let mixture = |observer: &str| Config {
+        observer: observer.parse().unwrap(),
+        gradient: GradientKind::Mixture,
+        ..Config::default()
+    };
+    assert!(mixture("history").check().is_err() && mixture("replay(60)").check().is_ok());
+    let config = Config::default();
+    assert!((config.entropy_weight(10 * config.updates()) - config.entropy_end).abs() < 1e-12);
 }
