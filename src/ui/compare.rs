@@ -77,8 +77,8 @@ fn is_same(one: &Shown, other: &Shown) -> bool {
 fn name(shown: &Shown, file: Option<&str>) -> String {
     let (setup, snapshot) = (&shown.started.setup, &shown.snapshot);
     let config = &setup.config;
-    let beta = snapshot.course.turns.iter().fold(numbers::short_beta(config.beta), |text, (update, beta)| {
-        format!("{text}, from {update} on {}", numbers::short_beta(*beta))
+    let beta = snapshot.course.turns.iter().fold(numbers::as_set(config.beta), |text, (update, beta)| {
+        format!("{text}, from {update} on {}", numbers::as_set(*beta))
     });
     let beta: String = if snapshot.course.turns.len() > 3 { "β on a course".to_owned() } else { format!("β {beta}") };
     match setup.ensemble {

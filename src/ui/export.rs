@@ -98,13 +98,13 @@ fn origin(shown: &Shown) -> String {
         return format!("A given ensemble of {experts}{preset}.{trained}");
     }
     let Config { beta: first, seed, alpha, .. } = setup.config;
-    let beta = numbers::short_beta(snapshot.beta);
+    let beta = numbers::as_set(snapshot.beta);
     let beta = match alpha {
         Some(alpha) => {
-            let price = numbers::short_beta(alpha).replace('-', "−");
+            let price = numbers::as_set(alpha);
             format!("β = {beta} by dual ascent, for an ensemble that returns at least {price} within T")
         }
-        None if snapshot.beta != first => format!("β = {beta}, moved by hand from {}", numbers::short_beta(first)),
+        None if snapshot.beta != first => format!("β = {beta}, moved by hand from {}", numbers::as_set(first)),
         None => format!("β = {beta}"),
     };
     let (update, last) = (numbers::grouped(snapshot.update), numbers::grouped(snapshot.last_update));

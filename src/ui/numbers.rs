@@ -56,9 +56,9 @@ pub fn percent(p: f64) -> String {
     }
 }
 
-/// β as it is set: no more decimals than it has.
-pub fn short_beta(beta: f64) -> String {
-    format!("{}", libm::round(beta * 1e4) / 1e4)
+/// A number as somebody has set it, as β or α: no more decimals than it has, four at most.
+pub fn as_set(value: f64) -> String {
+    format!("{}", libm::round(value * 1e4) / 1e4).replace('-', "−")
 }
 
 /// A probability to a tenth of a per cent; the same at the ends.
@@ -87,6 +87,7 @@ mod tests {
         assert_eq!((times(-52.0, -10.0).as_str(), times(-52.0, -1e-320).as_str()), ("5.2×", "–"));
         assert_eq!((times(-52.0, 0.0).as_str(), times(0.0, 0.0).as_str()), ("–", "–"));
         assert_eq!(steps(-0.01), "0.0");
+        assert_eq!([0.6, 0.0625, -20.125].map(as_set), ["0.6", "0.0625", "−20.125"]);
         assert_eq!(steps(-1.67e9), "−1.7×10⁹");
         assert_eq!([7, 100, 1000, 1_234_567].map(grouped), ["7", "100", "1,000", "1,234,567"]);
         assert_eq!(steps(12345.0), "1.2×10⁴");
