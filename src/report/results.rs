@@ -89,7 +89,8 @@ fn steps(value: f64) -> String {
 }
 
 fn summary(of: &Summary) -> String {
-    format!("{} ± {}<br>[{}, {}]", steps(of.mean), steps(of.sd), steps(of.low), steps(of.high))
+    let (low, high) = of.interval();
+    format!("{} ± {}<br>[{}, {}]", steps(of.mean), steps(of.sd), steps(low), steps(high))
 }
 
 fn plus_minus((mean, sd): (f64, f64)) -> String {
@@ -324,8 +325,8 @@ fn pareto(document: &mut Document, run: Run) -> Result<String, String> {
             color,
             points: points.iter().map(|point| (point.ensemble.mean, point.clone.mean)).collect(),
             mark: Mark::LineAndPoints,
-            intervals: Some(points.iter().map(|point| (point.clone.low, point.clone.high)).collect()),
-            x_intervals: Some(points.iter().map(|point| (point.ensemble.low, point.ensemble.high)).collect()),
+            intervals: Some(points.iter().map(|point| point.clone.interval()).collect()),
+            x_intervals: Some(points.iter().map(|point| point.ensemble.interval()).collect()),
             labels: Some(
                 points
                     .iter()
@@ -478,7 +479,7 @@ fn learning_curve(document: &mut Document, run: Run) -> Result<String, String> {
             color,
             points: sizes.iter().zip(&summaries).map(|(size, of)| (f64::from(*size), of.mean)).collect(),
             mark: Mark::LineAndPoints,
-            intervals: Some(summaries.iter().map(|of| (of.low, of.high)).collect()),
+            intervals: Some(summaries.iter().map(Summary::interval).collect()),
             ..Series::default()
         });
     }

@@ -270,7 +270,7 @@ pub fn table1(matches: &ArgMatches) -> Result<(), String> {
 }
 
 fn shown(summary: &Summary) -> String {
-    let Summary { mean, sd, low, high, .. } = summary;
+    let (Summary { mean, sd, .. }, (low, high)) = (summary, summary.interval());
     format!("{mean:8.2} ± {sd:5.2}  [{low:.2}, {high:.2}]")
 }
 

@@ -6,7 +6,10 @@ pub mod race;
 pub mod sweep;
 pub mod table1;
 
+use std::hash::{Hash, Hasher};
+
 use egui::accesskit::Live;
+use egui::cache::{ComputerMut, FrameCache};
 use egui::{ProgressBar, RichText, Ui};
 
 use super::app::App;
@@ -178,13 +181,34 @@ fn introduce(ui: &mut Ui, title: &str, text: &str) {
 }
 
 /// A figure over seeds, as mean ± standard deviation; its interval is in the hint.
-fn summary_cell(summary: &Summary, is_steps: bool) -> Cell {
+fn summary_cell(ui: &Ui, summary: &Summary, is_steps: bool) -> Cell {
     let number = |value: f64| if is_steps { numbers::short(value) } else { numbers::percent(value) };
-    let Summary { mean, sd, low, high, seeds } = *summary;
+    let Summary { mean, sd, ref values } = *summary;
+    let seeds = values.len();
+    let (low, high) = interval(ui, summary);
     let spread = if is_steps { numbers::short(sd) } else { format!("{:.0} %", 100.0 * sd) };
     let text = if seeds > 1 { format!("{} ± {spread}", number(mean)) } else { number(mean) };
     let hint = format!("95 % bootstrap interval {} to {}, {seeds} seeds", number(low), number(high));
     Cell::number(mean, text).hover(&hint)
+}
+
+/// The interval of a summary, made once for as long as it is shown.
+fn interval(ui: &Ui, summary: &Summary) -> (f64, f64) {
+    #[derive(Default)]
+    struct Intervals;
+    #[derive(Clone, Copy)]
+    struct Key<'a>(&'a Summary);
+    impl Hash for Key<'_> {
+        fn hash<H: Hasher>(&self, state: &mut H) {
+            self.0.values.iter().for_each(|value| value.to_bits().hash(state));
+        }
+    }
+    impl ComputerMut<Key<'_>, (f64, f64)> for Intervals {
+        fn compute(&mut self, Key(summary): Key<'_>) -> (f64, f64) {
+            summary.interval()
+        }
+    }
+    ui.memory_mut(|memory| *memory.caches.cache::<FrameCache<(f64, f64), Intervals>>().get(Key(summary)))
 }
 
 /// A figure of the paper's, mean and standard deviation, where it has one.

@@ -190,12 +190,13 @@ fn show_table(ui: &mut Ui, sweep: &Sweep, kind: usize, is_papers: bool) {
         let paper = Sweep::PAPER.iter().find(|(beta, _)| is_papers && *beta == point.beta);
         vec![
             Cell::number(point.beta, point.beta.to_string()),
-            summary_cell(&point.ensemble, is_steps),
-            summary_cell(&point.clone, is_steps),
-            summary_cell(&point.occupancy, is_steps),
+            summary_cell(ui, &point.ensemble, is_steps),
+            summary_cell(ui, &point.clone, is_steps),
+            summary_cell(ui, &point.occupancy, is_steps),
             paper_cell(paper.map(|(_, paper)| paper.ensemble), palette),
             paper_cell(paper.map(|(_, paper)| paper.clone), palette),
         ]
     });
-    table(ui, "sweep table", &columns, rows.collect());
+    let rows = rows.collect();
+    table(ui, "sweep table", &columns, rows);
 }

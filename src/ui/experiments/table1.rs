@@ -93,24 +93,25 @@ fn show_table(ui: &mut Ui, made: &Table1, kind: usize, is_papers: bool) {
     columns.push(Column::new("paper: clone", "The paper's Table 1, by behaviour cloning"));
     columns.extend(made.attackers.iter().map(|cloner| Column::new(&cloner.to_string(), cloner.model().summary)));
     let is_steps = RETURN_KINDS[kind].is_steps;
+    ui.label(RichText::new(format!("Return ({label}), mean ± sd over seeds")).small().color(palette.muted));
     let rows = rows.iter().zip(&within).map(|(row, within)| {
         let method = &METHODS[row.method];
         let paper = method.paper.as_ref().filter(|_| is_papers);
         let mut cells = vec![
             Cell::number(row.method as f64, method.title.to_owned()).hover(method.summary),
-            summary_cell(&row.ensemble, is_steps),
+            summary_cell(ui, &row.ensemble, is_steps),
         ];
         cells.push(paper_cell(paper.map(|paper| paper.ensemble), palette));
         cells.push(paper_cell(paper.map(|paper| paper.clone), palette));
         for (clone, within) in row.clones.iter().zip(&within.clones) {
             cells.push(match (clone, within) {
                 (Some(clone), _) => {
-                    let cell = summary_cell(clone, is_steps);
+                    let cell = summary_cell(ui, clone, is_steps);
                     let is_lost = is_steps && clone.mean < row.ensemble.mean - 5.0;
                     if is_lost { cell.colored(palette.clone) } else { cell }
                 }
                 (None, Some(within)) => {
-                    let cell = summary_cell(within, true).suffix(" in T");
+                    let cell = summary_cell(ui, within, true).suffix(" in T");
                     cell.hover("A clone with a memory has no hitting times to cap: its return within T stands here.")
                 }
                 (None, None) => Cell::number(f64::NEG_INFINITY, "–".to_owned()),
@@ -118,6 +119,6 @@ fn show_table(ui: &mut Ui, made: &Table1, kind: usize, is_papers: bool) {
         }
         cells
     });
-    ui.label(RichText::new(format!("Return ({label}), mean ± sd over seeds")).small().color(palette.muted));
-    table(ui, "table 1", &columns, rows.collect());
+    let rows = rows.collect();
+    table(ui, "table 1", &columns, rows);
 }
