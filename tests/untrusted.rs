@@ -131,6 +131,49 @@ fn a_course_has_no_more_turns_than_a_hand_can_make() {
     assert!(course(10_001).check().unwrap_err().to_string().starts_with("course: expected at most 10000 turns"));
 }
 
+/// Every update was a point of the curve where the configuration is of a single one: the page kept and drew ten million, and
+/// took a worker for broken that sent more than ten thousand at once.
+#[test]
+fn a_long_run_leaves_a_curve_of_usual_length() {
+    let grid = GridSpec { rows: 2, cols: 2, ..GridSpec::default() };
+    let config = Config { experts: 1, batch_steps: 1, total_steps: 1, horizon: 1, ..Config::default() };
+    for updates in [50, 1200, 30_001] {
+        let course = Course { turns: Vec::new(), updates: Some(updates) };
+        let setup = Setup { grid: grid.clone(), config: config.clone(), course, ensemble: None };
+        let mut session = Session::new();
+        session.handle(Command::Load { setup: Box::new(setup), play: true });
+        let mut points = Vec::new();
+        let mut now = 0.0;
+        while points.last() != Some(&updates) {
+            now += 100.0;
+            session.advance(&|| now);
+            for event in session.events() {
+                if let Event::Snapshot(snapshot) = event {
+                    session.handle(Command::Seen(snapshot.number));
+                    points.extend(snapshot.curve.iter().map(|point| point.update));
+                }
+            }
+        }
+        assert!((50..=1300).contains(&points.len()), "{updates}: {}", points.len());
+        assert!(points.is_sorted_by(|a, b| a < b) && points[0] == 0);
+    }
+}
+
+/// Serde takes the entries of an array for the fields of an object, and what is checked by its name was not: a horizon of four
+/// billion steps was evaluated.
+#[test]
+fn a_file_is_an_object() {
+    let rows = "[0,0,1,0,0],[0,0,1,0,0],[1,0,0,0,0],[1,0,0,0,0]";
+    let grid = r#"{"rows":2,"cols":2,"goal":[0,0]}"#;
+    let array = format!(r#"["ape-ensemble",1,{grid},[[{rows}]],{{"horizon":4294967295}}]"#);
+    assert!(EnsembleFile::parse(&array).unwrap_err().to_string().contains("no object of fields"));
+    let object = format!(
+        r#"{{"format":"ape-ensemble","version":1,"grid":{grid},"experts":[[{rows}]],"config":{{"horizon":4294967295}}}}"#
+    );
+    let file = EnsembleFile::parse(&object).unwrap();
+    assert!(file.config.is_none() && file.left_out.unwrap().contains("horizon 4294967295: must be"));
+}
+
 /// Without an end to its episodes, an attack of no steps collected pairs for ever.
 #[test]
 fn tasks_are_checked_before_they_are_done() {
@@ -289,14 +332,17 @@ fn what_cannot_be_is_not_taken() {
         horizon_error: 0.1,
         success_error: 0.1,
     };
-    assert!(returns.check().is_ok());
+    assert!(returns.check(100).is_ok());
     for wrong in [
         KnownReturns { horizon_return: 1.0, ..returns },
+        KnownReturns { horizon_return: -100.1, ..returns },
+        KnownReturns { horizon_error: 101.0, ..returns },
+        KnownReturns { success_error: 3.1, ..returns },
         KnownReturns { uncapped_return: Some(1e300), ..returns },
         KnownReturns { success: 1.1, ..returns },
         KnownReturns { horizon_error: -1.0, ..returns },
     ] {
-        assert!(wrong.check().is_err(), "{wrong:?}");
+        assert!(wrong.check(100).is_err(), "{wrong:?}");
     }
 }
 

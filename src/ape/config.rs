@@ -123,6 +123,8 @@ impl Config {
     /// Most experts an ensemble may have.
     pub const MAX_EXPERTS: u32 = 8;
     pub const MAX_BETA: f64 = 2.0;
+    /// Longest T, in steps.
+    pub const MAX_HORIZON: u32 = 10_000;
     /// Most updates of a run.
     pub const MOST_UPDATES: u32 = 10_000_000;
 

@@ -169,11 +169,13 @@ impl EnsembleFile {
         if text.len() > Self::LONGEST {
             return Err(EnsembleError::Long);
         }
-        let mut value = json::parse(text).map_err(EnsembleError::Json)?;
-        let mut take = |name| value.as_object_mut().and_then(|fields| fields.remove(name));
-        let (config, digest) = (take("config"), take("digest"));
+        let serde_json::Value::Object(mut fields) = json::parse(text).map_err(EnsembleError::Json)? else {
+            return Err(EnsembleError::Json("no object of fields".to_owned()));
+        };
+        let (config, digest) = (fields.remove("config"), fields.remove("digest"));
         let digest = digest.and_then(|digest| json::read("digest", digest).ok());
-        let file = EnsembleFile { digest, ..json::read("", value).map_err(EnsembleError::Json)? };
+        let file =
+            EnsembleFile { digest, ..json::read("", serde_json::Value::Object(fields)).map_err(EnsembleError::Json)? };
         let config: Result<Config, String> = match config {
             None | Some(serde_json::Value::Null) => return Ok(file),
             Some(config) => json::read("config", config),

@@ -37,11 +37,13 @@ fn main() -> eframe::Result {
 mod window {
     //! Files of a window: they are written to where it was started from, and read when they are dropped on it.
 
+    use std::collections::VecDeque;
+
     use ape_lab::ui::{Host, check_length};
 
     #[derive(Default)]
     pub struct Files {
-        opened: Vec<(String, Result<String, String>)>,
+        opened: VecDeque<(String, Result<String, String>)>,
     }
 
     impl Host for Files {
@@ -63,11 +65,11 @@ mod window {
             let length = std::fs::metadata(path).map(|data| data.len() as f64).map_err(|error| error.to_string());
             let text = length.and_then(check_length).and_then(|()| file.bytes());
             let text = text.and_then(|bytes| String::from_utf8(bytes).map_err(|_| "expected a text".to_owned()));
-            self.opened.push((name, text));
+            self.opened.push_back((name, text));
         }
 
         fn opened(&mut self) -> Option<(String, Result<String, String>)> {
-            self.opened.pop()
+            self.opened.pop_front()
         }
     }
 }

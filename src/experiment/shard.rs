@@ -10,9 +10,9 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use super::{Setup, SetupError, Sweep, SweepRun, sweep};
-use crate::ape::json::quoted;
+use crate::ape::json::{quoted, without_mark};
 use crate::ape::{Config, Digest, Trainer};
-use crate::mdp::{Grid, GridSpec, KnownReturns};
+use crate::mdp::{Grid, GridSpec, KnownReturns, Returns};
 
 /// Shard I of K, written `I/K`. Run r of a sweep, counted from 0, is in shard r mod K + 1, so that every shard has
 /// its share of every β.
@@ -241,10 +241,30 @@ fn difference(field: &str, found: &Value, expected: &Value) -> Option<Box<Differ
 
 /// A run with its place in the sweep, from 0.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(from = "RunFields")]
 struct IndexedRun {
     index: usize,
     #[serde(flatten)]
     run: SweepRun,
+}
+
+/// The same as it is read: `flatten` would keep all that stands in a run until its end, in many times the memory of its text.
+#[derive(Deserialize)]
+struct RunFields {
+    index: usize,
+    beta: f64,
+    seed: u32,
+    ensemble: Returns,
+    clone: KnownReturns,
+    occupancy: KnownReturns,
+    digest: Digest,
+}
+
+impl From<RunFields> for IndexedRun {
+    fn from(fields: RunFields) -> IndexedRun {
+        let RunFields { index, beta, seed, ensemble, clone, occupancy, digest } = fields;
+        IndexedRun { index, run: SweepRun { beta, seed, ensemble, clone, occupancy, digest } }
+    }
 }
 
 /// A shard as a file: `{"format":"ape-sweep-shard","version":1,"shard":I,"shards":K,"complete":…,"sweep":…,"runs":[…]}`.
@@ -346,7 +366,7 @@ impl Shard {
             return wrong("expected every run once, in ascending order".to_owned());
         }
         let returns = [KnownReturns::from(run.ensemble), run.clone, run.occupancy];
-        returns.iter().try_for_each(KnownReturns::check).or_else(wrong)
+        returns.iter().try_for_each(|returns| returns.check(self.sweep.config.horizon)).or_else(wrong)
     }
 
     /// Takes over the runs that are done from an earlier file, which must be of the same shard of the same sweep.
@@ -376,6 +396,7 @@ impl Shard {
             version: u32,
         }
         let json = |error: serde_json::Error| ShardError::Json(quoted(&error));
+        let text = without_mark(text);
         let Head { format, version } = serde_json::from_str(text).map_err(json)?;
         if format != Self::FORMAT {
             return Err(ShardError::Format(quoted(&format)));
@@ -429,7 +450,6 @@ pub fn merge_shards(files: Vec<(String, Shard)>) -> Result<Sweep, ShardError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mdp::Returns;
 
     const SEEDS: u32 = 4;
 
@@ -526,6 +546,8 @@ mod tests {
         let before = shard.clone();
         let mut infinite = run(&plan, 6);
         infinite.occupancy.uncapped_return = Some(f64::NEG_INFINITY);
+        let mut endless = run(&plan, 6);
+        endless.occupancy.horizon_return = -101.0;
         let mut certain = run(&plan, 6);
         certain.clone.success = 1.5;
         for (index, run, expected) in [
@@ -533,6 +555,7 @@ mod tests {
             (1, run(&plan, 1), "run 1 (β 0, seed 2): expected every run once, in ascending order"),
             (6, run(&plan, 7), "run 6 (β 0.3, seed 4): expected β 0.3, seed 3 there"),
             (6, infinite, "run 6 (β 0.3, seed 3): uncapped_return -inf: expected a number from -1e300 to 0"),
+            (6, endless, "run 6 (β 0.3, seed 3): horizon_return -101.0: expected a number from -100 to 0"),
             (6, certain, "run 6 (β 0.3, seed 3): success 1.5: expected a number from 0 to 1"),
             (61, run(&plan, 1), "run 61 (β 0, seed 2): the sweep has 12 runs, expected an index below"),
         ] {

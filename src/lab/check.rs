@@ -34,7 +34,7 @@ fn within(what: &str, low: f64, high: f64, mut values: impl Iterator<Item = f64>
 }
 
 fn returns(returns: impl Into<KnownReturns>) -> Checked {
-    returns.into().check()
+    returns.into().check(Config::MAX_HORIZON)
 }
 
 fn policy(rows: &[[f64; ACTIONS]], grid: &Grid) -> Checked {

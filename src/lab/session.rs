@@ -20,8 +20,9 @@ const FRAME: f64 = 1000.0 / 60.0;
 pub const IN_FLIGHT: u32 = 2;
 /// How long the page may owe an answer before training waits for it, in milliseconds.
 const PATIENCE: f64 = 250.0;
-/// Points that a whole run leaves on the curve.
+/// Points that a run of the usual length leaves on the curve, and about the most that a longer one leaves.
 const CURVE_POINTS: u32 = 60;
+const MOST_CURVE_POINTS: u32 = 1200;
 
 /// Clones that may be shown besides that of the run's own observer.
 const MOST_SHOWN: usize = 16;
@@ -171,7 +172,7 @@ impl Session {
             Command::Play => {
                 self.begin_queued()?;
                 self.arrive();
-                self.training()?.go_on();
+                self.unfinished()?.go_on();
             }
             Command::Pause => {
                 self.begin_queued()?;
@@ -181,7 +182,7 @@ impl Session {
             Command::Step => {
                 self.begin_queued()?;
                 self.arrive();
-                let run = self.training()?;
+                let run = self.unfinished()?;
                 (run.is_playing, run.is_silent) = (false, false);
                 run.last_update = run.last_update.max(run.trainer().updates() + 1);
                 run.set_course_updates();
@@ -225,6 +226,15 @@ impl Session {
         }
     }
 
+    /// The run, where it trains and may go on from where it is.
+    fn unfinished(&mut self) -> Result<&mut Run, String> {
+        let run = self.training()?;
+        if run.trainer().updates() >= Config::MOST_UPDATES {
+            return Err(format!("This run has made {} updates, which is as many as it can.", Config::MOST_UPDATES));
+        }
+        Ok(run)
+    }
+
     /// Begins the run of a β that was asked for while another was being trained: the β on the page is the
     /// one that counts, whatever is done next.
     fn begin_queued(&mut self) -> Result<(), String> {
@@ -265,7 +275,7 @@ impl Session {
     /// Goes on with another β: where there is a future already, on a branch beside it.
     fn continue_with(&mut self, beta: f64) -> Result<(), String> {
         let runs = self.runs;
-        let run = self.training()?;
+        let run = self.unfinished()?;
         let update = run.trainer().updates();
         if run.trainer().config().beta == beta {
             // What is to come has been, or comes as it would have.
@@ -505,7 +515,8 @@ impl Run {
             Some(recording) if recording.end() < updates => recording.keep(trainer),
             _ => return,
         }
-        let every = self.setup.config.updates().div_ceil(CURVE_POINTS);
+        let usual = self.setup.config.updates().div_ceil(CURVE_POINTS);
+        let every = usual.max(self.last_update.div_ceil(MOST_CURVE_POINTS));
         if updates.is_multiple_of(every) || updates == self.last_update {
             self.add_curve_point();
         }

@@ -124,19 +124,21 @@ impl From<Returns> for KnownReturns {
 }
 
 impl KnownReturns {
-    /// Whether these can be the returns of a policy; a sentence says which is not.
-    pub fn check(&self) -> Result<(), String> {
+    /// Whether these can be the returns of a policy, with a T of `horizon` steps; a sentence says which is not.
+    pub fn check(&self, horizon: u32) -> Result<(), String> {
         // Means may be off by a last bit.
         const BIT: f64 = 1e-9;
         let steps = -LONGEST * (1.0 + BIT)..=BIT;
-        let error = 0.0..=LONGEST;
+        let (most, within_t) = (f64::from(horizon), format!("-{horizon} to 0"));
+        let within = -most * (1.0 + BIT)..=BIT;
         let figures = [
             ("capped_return", self.capped_return, -CAP - BIT..=BIT, "-100 to 0"),
-            ("uncapped_return", self.uncapped_return, steps.clone(), "-1e300 to 0"),
-            ("horizon_return", Some(self.horizon_return), steps, "-1e300 to 0"),
+            ("uncapped_return", self.uncapped_return, steps, "-1e300 to 0"),
+            ("horizon_return", Some(self.horizon_return), within, &within_t),
             ("success", Some(self.success), -BIT..=1.0 + BIT, "0 to 1"),
-            ("horizon_error", Some(self.horizon_error), error.clone(), "0 to 1e300"),
-            ("success_error", Some(self.success_error), error, "0 to 1e300"),
+            ("horizon_error", Some(self.horizon_error), 0.0..=most, &format!("0 to {horizon}")),
+            // Of few trials none of which failed, 3 divided by their number.
+            ("success_error", Some(self.success_error), 0.0..=3.0, "0 to 3"),
         ];
         for (name, value, range, expected) in figures {
             if let Some(value) = value.filter(|value| !range.contains(value)) {

@@ -492,8 +492,12 @@ impl App {
     /// The run goes on from the moment shown with this β; where that lies back, on a branch.
     pub fn continue_with(&mut self, beta: f64) {
         if let Some(shown) = &self.shown {
-            // The session will say the same.
             let update = shown.snapshot.update;
+            if update >= Config::MOST_UPDATES || self.setup.course.turns.len() >= Course::MOST_TURNS {
+                // It will say why not.
+                return self.send(Command::Continue { beta });
+            }
+            // The session will say the same.
             if update >= self.setup.updates() {
                 let last = update.saturating_add(self.setup.config.updates());
                 self.setup.course.updates = Some(last.min(Config::MOST_UPDATES));
