@@ -1,19 +1,21 @@
 //! What training algorithms have in common, and [`Trainer`], a run by any of them.
 
 use std::hash::Hasher;
+use std::sync::Arc;
 
 use super::adam::Adam;
 use super::exact_ape::ExactApe;
 use super::observer::Memory;
 use super::pg_ape::PgApe;
 use super::softmax::softmax;
-use super::{AlgorithmKind, Config, ConfigError, Contexts, Digest, Ensemble};
+use super::{AdversaryReward, AlgorithmKind, Config, ConfigError, Contexts, Digest, Ensemble};
 use crate::mdp::{ACTIONS, Grid};
 
 /// What every algorithm holds: the experts, where and how they train.
 #[derive(Clone)]
 pub struct Experts {
-    pub grid: Grid,
+    /// What copies share: a recording holds thousands.
+    pub grid: Arc<Grid>,
     pub config: Config,
     /// θ, `[n][S][5]`.
     pub logits: Vec<f64>,
@@ -25,7 +27,13 @@ pub struct Experts {
 impl Experts {
     /// `logits`: `[n][S][5]`.
     pub fn new(grid: Grid, config: Config, logits: Vec<f64>) -> Experts {
-        Experts { adam: Adam::new(logits.len()), grid, config, logits, updates: 0 }
+        Experts { adam: Adam::new(logits.len()), grid: Arc::new(grid), config, logits, updates: 0 }
+    }
+
+    /// About how many bytes a copy takes: r̃, and θ with two moments of Adam each.
+    pub fn bytes(&self) -> usize {
+        let reward = self.config.adversary_reward.as_ref().map_or(0, AdversaryReward::bytes);
+        size_of::<Experts>() + reward + 3 * 8 * self.logits.len()
     }
 
     /// The experts as they are now.

@@ -8,6 +8,8 @@
 //! derivative flows to every expert; with `occupancy`, p(c|s) is itself made of the experts' visits, and that
 //! part of the derivative is once more the return of a policy, for a reward of its own.
 
+use std::sync::Arc;
+
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
@@ -21,7 +23,7 @@ pub struct ExactApe {
     experts: Experts,
     prospect: Prospect,
     /// r̃(s, a), `[S][5]`; −1 everywhere where the clone's reward is the experts'.
-    clone_reward: Vec<[f64; ACTIONS]>,
+    clone_reward: Arc<[[f64; ACTIONS]]>,
 }
 
 impl ExactApe {
@@ -40,6 +42,7 @@ impl ExactApe {
             Some(reward) => reward.table(&grid),
             None => vec![[-1.0; ACTIONS]; grid.cells()],
         };
+        let clone_reward = clone_reward.into();
         ExactApe { prospect: Prospect::default(), clone_reward, experts: Experts::new(grid, config, logits) }
     }
 
@@ -51,7 +54,7 @@ impl ExactApe {
 
     /// The same, the experts being known.
     fn gradient_of(&mut self, ensemble: &Ensemble) -> ExactGradient {
-        let task = (&self.experts.grid, self.experts.config.horizon);
+        let task = (&*self.experts.grid, self.experts.config.horizon);
         let (n, cells) = (ensemble.experts(), self.experts.grid.cells());
         let beta = self.beta_now();
         let share = 1.0 / n as f64;
@@ -134,7 +137,7 @@ impl Algorithm for ExactApe {
     }
 
     fn bytes(&self) -> usize {
-        3 * 8 * self.experts.logits.len() + 40 * self.clone_reward.len()
+        size_of::<ExactApe>() + self.experts.bytes()
     }
 
     fn boxed(&self) -> Box<dyn Algorithm> {

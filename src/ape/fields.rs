@@ -86,7 +86,7 @@ impl Field {
         match &self.kind {
             Kind::Real { low, high, get, .. } => {
                 let value = get(config);
-                if (*low..=*high).contains(&value) { Ok(()) } else { Err(self.error(value)) }
+                if (*low..=*high).contains(&value) { Ok(()) } else { Err(self.error(written(value))) }
             }
             Kind::Whole { low, high, get, .. } => {
                 let value = get(config);
@@ -113,11 +113,17 @@ impl Field {
     /// The field's value as text.
     pub fn text(&self, config: &Config) -> String {
         match &self.kind {
-            Kind::Real { get, .. } => get(config).to_string(),
+            Kind::Real { get, .. } => written(get(config)),
             Kind::Whole { get, .. } => get(config).to_string(),
             Kind::Word { get, .. } | Kind::Text { get, .. } => get(config),
         }
     }
+}
+
+/// A number as text that reads back to the last bit, and is short also where it is tiny or huge.
+pub fn written(value: f64) -> String {
+    let text = format!("{value:?}");
+    text.strip_suffix(".0").map(str::to_owned).unwrap_or(text)
 }
 
 macro_rules! real {
@@ -243,7 +249,7 @@ pub static FIELDS: [Field; 19] = [
         label: "Horizon T (steps)",
         paper: Some("100"),
         help: "Longest episode, in steps.",
-        kind: whole!(horizon, 1, 10_000),
+        kind: whole!(horizon, 1, Config::MAX_HORIZON),
     },
     Field {
         name: "batch_steps",

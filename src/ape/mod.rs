@@ -29,7 +29,7 @@ pub use demonstrate::{Demonstrator, Episode};
 pub use digest::{Digest, DigestError};
 pub use ensemble::{Contexts, Ensemble, EnsembleError, EnsembleFile};
 pub use exact_ape::{ExactApe, ExactGradient};
-pub use fields::{ConfigError, FIELDS, Field, Kind};
+pub use fields::{ConfigError, FIELDS, Field, Kind, written};
 pub use figures::{Figures, Identity};
 pub use pg_ape::{Gradient, PgApe};
 pub use recurrent::{Labelled, Network};

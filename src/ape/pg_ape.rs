@@ -8,6 +8,8 @@
 //! of a batch but how often each (context, state, action) was taken and the sum of the returns that followed: a
 //! [`Tally`].
 
+use std::sync::Arc;
+
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::adam::Adam;
@@ -53,9 +55,9 @@ pub struct PgApe {
     values: Vec<f64>,
     values_adam: Adam,
     /// What the return after step t counts for `from_start`, γᵗ: `[T]`. For `from_step` all count the same.
-    weights: Option<Vec<f64>>,
+    weights: Option<Arc<[f64]>>,
     /// r̃ by entry, `[S][n][5]`, where the clone's reward is not the experts'.
-    adversary_reward: Option<Vec<f64>>,
+    adversary_reward: Option<Arc<[f64]>>,
     played: Played,
 }
 
@@ -304,8 +306,8 @@ impl Algorithm for PgApe {
     }
 
     fn bytes(&self) -> usize {
-        // Numbers with two moments of Adam each.
-        3 * 8 * (self.experts.logits.len() + self.values.len()) + self.observer.bytes()
+        // What `joint` or `separate` has learned comes with two moments of Adam each.
+        size_of::<PgApe>() + self.experts.bytes() + 3 * 8 * self.values.len() + self.observer.bytes()
     }
 
     fn boxed(&self) -> Box<dyn Algorithm> {
@@ -333,5 +335,30 @@ impl Algorithm for PgApe {
         // 5: update of the value function, φ ← φ − α_φ ∇J(φ).
         self.values_adam.ascend(&mut self.values, &value_gradient, self.experts.config.learning_rate);
         -self.played.ensemble_tally.steps / self.played.ensemble_tally.episodes
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mdp::GridSpec;
+
+    /// A recording holds thousands of copies, and counts what each has for itself.
+    #[test]
+    fn copies_share_what_never_changes() {
+        let config = Config {
+            return_to_go: ReturnToGo::FromStart,
+            horizon: 10_000,
+            batch_steps: 1,
+            adversary_reward: "9,9=-1 stay=0.5".parse().ok(),
+            ..Config::default()
+        };
+        let run = PgApe::new(Grid::new(GridSpec::default()).unwrap(), config);
+        let copy = run.clone();
+        assert!(Arc::ptr_eq(&run.experts.grid, &copy.experts.grid));
+        let are_shared = |of: fn(&PgApe) -> &Option<Arc<[f64]>>| {
+            of(&run).as_ref().zip(of(&copy).as_ref()).is_some_and(|(a, b)| Arc::ptr_eq(a, b))
+        };
+        assert!(are_shared(|run| &run.weights) && are_shared(|run| &run.adversary_reward));
     }
 }

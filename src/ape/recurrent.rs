@@ -54,8 +54,8 @@ pub struct Network {
     parameters: Vec<f64>,
 }
 
-/// What an episode's way forward keeps for the way back; its buffers are used again for the next.
-#[derive(Clone, Default)]
+/// What an episode's way forward keeps for the way back; its buffers are used again for the next, so that a copy of it is empty.
+#[derive(Default)]
 struct Trace {
     /// `[T + 1][H]`: the GRU's output, from before the first cell.
     hidden: Vec<f64>,
@@ -63,6 +63,12 @@ struct Trace {
     gates: Vec<f64>,
     /// `[T][H]`: gradient by the GRU's output, of that step's p alone.
     pull: Vec<f64>,
+}
+
+impl Clone for Trace {
+    fn clone(&self) -> Self {
+        Trace::default()
+    }
 }
 
 impl Network {

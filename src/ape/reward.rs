@@ -6,6 +6,7 @@ use std::str::FromStr;
 use serde::de::Error;
 use serde::{Deserialize, Deserializer, Serialize};
 
+use super::fields::written;
 use crate::mdp::{ACTIONS, Action, Cell, Grid};
 
 /// r̃(s, a), the sum of a reward for acting in a cell and one for the action chosen. Written as
@@ -24,6 +25,11 @@ impl AdversaryReward {
     const MOST: f64 = 1000.0;
     /// Most terms: each cell of the largest grid, and each action.
     const MOST_TERMS: usize = Grid::MOST_WALLS + ACTIONS;
+
+    /// About how many bytes a copy takes.
+    pub fn bytes(&self) -> usize {
+        size_of_val(self.cells.as_slice())
+    }
 
     /// The first cell where no step of a grid begins: outside, a wall or the goal.
     pub fn idle(&self, grid: &Grid) -> Option<Cell> {
@@ -51,9 +57,9 @@ impl AdversaryReward {
 
 impl fmt::Display for AdversaryReward {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let cells = self.cells.iter().map(|((row, col), reward)| format!("{row},{col}={reward}"));
+        let cells = self.cells.iter().map(|((row, col), reward)| format!("{row},{col}={}", written(*reward)));
         let actions = Action::ALL.iter().zip(&self.actions).filter(|(_, reward)| **reward != 0.0);
-        let actions = actions.map(|(action, reward)| format!("{}={reward}", action.name().to_lowercase()));
+        let actions = actions.map(|(action, reward)| format!("{}={}", action.name().to_lowercase(), written(*reward)));
         f.write_str(&cells.chain(actions).collect::<Vec<_>>().join(" "))
     }
 }

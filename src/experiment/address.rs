@@ -6,7 +6,7 @@
 use percent_encoding::{AsciiSet, CONTROLS, percent_decode_str, utf8_percent_encode};
 
 use super::{PRESETS, Preset, Setup};
-use crate::ape::{Config, FIELDS, Field};
+use crate::ape::{Config, FIELDS, Field, written};
 use crate::mdp::{Cell, Grid, GridSpec};
 
 /// Version of the names and of what they mean.
@@ -107,7 +107,7 @@ pub fn write(setup: &Setup) -> Pairs {
         put("walls", write_walls(&grid.walls));
     }
     if grid.slip != paper.slip {
-        put("slip", grid.slip.to_string());
+        put("slip", written(grid.slip));
     }
     for field in &FIELDS {
         let value = field.text(&setup.config);
@@ -116,7 +116,8 @@ pub fn write(setup: &Setup) -> Pairs {
         }
     }
     if !setup.course.turns.is_empty() {
-        let turns: Vec<String> = setup.course.turns.iter().map(|(update, beta)| format!("{update}:{beta}")).collect();
+        let turn = |(update, beta): &(u32, f64)| format!("{update}:{}", written(*beta));
+        let turns: Vec<String> = setup.course.turns.iter().map(turn).collect();
         put("turns", turns.join(";"));
     }
     if let Some(updates) = setup.course.updates {
@@ -252,6 +253,24 @@ mod tests {
         assert_eq!(encode(&write(&Setup::default())), "v=1");
         let text = encode(&write(&setup));
         assert!(text.contains("walls=0:3-5;2:7") && text.contains("turns=10:0.25;300:0.1"), "{text}");
+    }
+
+    /// Three hundred zeros in each of a few numbers made an address too long to be read again.
+    #[test]
+    fn tiny_numbers_are_written_short() {
+        let tiny = 5e-324;
+        let course = Course { turns: (0..200).map(|update| (update, tiny)).collect(), updates: None };
+        let grid = GridSpec { slip: tiny, ..GridSpec::default() };
+        let reward: Vec<String> = (1..100).map(|cell| format!("{},{}=1e-310", cell / 10, cell % 10)).collect();
+        let config = Config { beta: tiny, adversary_reward: reward.join(" ").parse().ok(), ..Config::default() };
+        let setup = Setup { grid, config, course, ensemble: None };
+        assert_eq!(setup.check(), Ok(()));
+        assert_eq!(through(&setup), setup);
+        let text = encode(&write(&setup));
+        assert!(text.len() < 5000 && text.contains("slip=5e-324&beta=5e-324"), "{text}");
+        let huge = crate::mdp::GridError::Slip(1e300).to_string()
+            + &Config { beta: 1e300, ..Config::default() }.check().unwrap_err().to_string();
+        assert!(huge.len() < 120, "{huge}");
     }
 
     #[test]

@@ -62,7 +62,7 @@ pub enum GridError {
     Size { rows: u32, cols: u32 },
     #[error("{0} walls: must be at most {most}, one for each cell of the largest grid", most = Grid::MOST_WALLS)]
     Walls(usize),
-    #[error("slip {0}: must be at least 0 and below 1")]
+    #[error("slip {0:?}: must be at least 0 and below 1")]
     Slip(f64),
     #[error("goal (row {}, column {}) lies outside the grid of {rows} × {cols} cells", .goal.0, .goal.1)]
     GoalOutside { goal: Cell, rows: u32, cols: u32 },

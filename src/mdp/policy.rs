@@ -15,9 +15,9 @@ pub struct Policy {
 pub enum PolicyError {
     #[error("the policy has {found} rows: expected {expected}, one for each cell")]
     Rows { found: usize, expected: usize },
-    #[error("cell (row {}, column {}): probability {value} of action {action}: must be from 0 to 1", .cell.0, .cell.1)]
+    #[error("cell (row {}, column {}): probability {value:?} of action {action}: must be from 0 to 1", .cell.0, .cell.1)]
     Probability { cell: Cell, action: usize, value: f64 },
-    #[error("cell (row {}, column {}): the probabilities sum to {sum}: must be 1 (to {})", .cell.0, .cell.1, Policy::TOLERANCE)]
+    #[error("cell (row {}, column {}): the probabilities sum to {sum:?}: must be 1 (to {})", .cell.0, .cell.1, Policy::TOLERANCE)]
     Sum { cell: Cell, sum: f64 },
 }
 

@@ -49,8 +49,8 @@ impl Observer for Recurrent {
     }
 
     fn bytes(&self) -> usize {
-        // The network, and two moments of Adam for each of its numbers.
-        3 * 8 * self.network.parameters()
+        // The network, its gradient, and two moments of Adam for each of its numbers.
+        4 * 8 * self.network.parameters()
     }
 
     fn saw(&mut self, context: usize, states: &[u32]) {
