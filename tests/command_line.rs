@@ -51,7 +51,7 @@ fn a_trained_ensemble_evaluates_to_the_figures_it_was_printed_with() {
     let file: Value = serde_json::from_str(&std::fs::read_to_string(files[1]).unwrap()).unwrap();
     let attack = ape(&["attack", files[1], "--attackers", "uniform", "--json"]);
     let attack: Value = serde_json::from_slice(&attack.stdout).unwrap();
-    for digest in [&file["digest"], &attack["digest"], &json!(last.last().unwrap())] {
+    for digest in [&file["digest"], &attack["digest"], &evaluated["digest"], &json!(last.last().unwrap())] {
         assert_eq!(*digest, trained["digest"]);
     }
 }
@@ -143,6 +143,11 @@ fn bad_flags_get_one_sentence() {
     assert!(memory.contains("observer history: must be uniform or occupancy with the algorithm exact"), "{memory}");
     let reward = complaint(&["train", "--adversary-reward", "stay=1", "--observer", "gru"]);
     assert!(reward.contains("observer gru(4): must be one whose clone is exact"), "{reward}");
+    let lines = complaint(&["train", "--batch-steps", "1", "--total-steps", "1000001", "--curve", "curve.csv"]);
+    assert!(
+        lines.contains("--curve curve.csv: a line for each of 1000001 updates, expected at most 1000000"),
+        "{lines}"
+    );
     assert!(complaint(&["table1", "--observer", "history"]).contains("needs one without a memory"));
     assert!(complaint(&["table1", "--preset", "price"]).contains("alpha -14: must be none where runs are compared"));
     assert!(complaint(&["sweep", "--out", "/no/such/folder/x.csv"]).contains("there is no folder /no/such/folder"));

@@ -41,7 +41,8 @@ pub struct Cloned {
     pub policy: Policy,
     /// p(c|s), `[S][n]`, where the clone is a mixture of the experts.
     pub contexts: Option<Contexts>,
-    /// Expected steps to the goal from each cell, `[S]`: hitting times; of a clone with a memory steps within T.
+    /// Expected steps to the goal from each cell, `[S]`: hitting times; of a clone with a memory steps within T,
+    /// but of `history`, whose law is that of the ensemble.
     pub steps: Vec<f64>,
     pub returns: KnownReturns,
     /// State–action pairs that it was made of; none for a limit of infinitely many.

@@ -2,6 +2,7 @@
 
 use egui::{Context, RichText, ThemePreference, Ui};
 use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value};
 
 use super::app::App;
 use super::theme::{self, Palette};
@@ -41,6 +42,28 @@ impl Default for Preferences {
     }
 }
 
+impl Preferences {
+    /// What was kept, maybe by another version: what is not known here is as usual, and nothing else with it.
+    fn recalled(text: &str) -> Preferences {
+        let read = |fields: &Map<String, Value>| serde_json::from_value(Value::Object(fields.clone()));
+        let mut known = Map::new();
+        for (name, value) in serde_json::from_str::<Map<String, Value>>(text).unwrap_or_default() {
+            known.insert(name.clone(), value);
+            if read(&known).map(|_: Preferences| ()).is_err() {
+                known.remove(&name);
+            }
+        }
+        let recalled: Preferences = read(&known).unwrap_or_default();
+        let usual = Preferences::default();
+        let has_size = TEXT_SIZES.iter().any(|(size, ..)| *size == recalled.text_size);
+        Preferences {
+            text_size: if has_size { recalled.text_size } else { usual.text_size },
+            color_map: if recalled.color_map < COLOR_MAPS.len() { recalled.color_map } else { usual.color_map },
+            ..recalled
+        }
+    }
+}
+
 /// Sizes of text on offer.
 pub const TEXT_SIZES: [(f32, &str, &str); 4] = [
     (1.0, "100 %", "As designed"),
@@ -54,14 +77,7 @@ const NAME: &str = "preferences";
 impl App {
     /// Takes up what was preferred at the last visit.
     pub(super) fn recall_preferences(&mut self, ctx: &Context) {
-        let kept = self.host.kept(NAME).and_then(|text| serde_json::from_str(&text).ok());
-        let mut preferences: Preferences = kept.unwrap_or_default();
-        // What was kept may be of another version.
-        if !TEXT_SIZES.iter().any(|(size, ..)| *size == preferences.text_size) {
-            preferences.text_size = 1.0;
-        }
-        preferences.color_map = preferences.color_map.min(COLOR_MAPS.len() - 1);
-        self.preferences = preferences;
+        self.preferences = self.host.kept(NAME).map_or(Preferences::default(), |text| Preferences::recalled(&text));
         self.apply_preferences(ctx);
     }
 
@@ -121,4 +137,30 @@ pub fn show(ui: &mut Ui, app: &mut App) {
     ui.checkbox(&mut now.explains, "Explain every control")
         .on_hover_text("What a control does, the paper's value and equation stand under it; without a pointer, too");
     app.prefer(now, ui.ctx());
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_preference_of_another_version_leaves_the_others_as_they_are() {
+        let usual = Preferences::default();
+        for (kept, expected) in [
+            (
+                r#"{"theme":"Sepia","text_size":1.6,"explains":true,"font":"big"}"#,
+                Preferences { text_size: 1.6, explains: true, ..usual },
+            ),
+            (r#"{"color_map":-1,"theme":"Dark"}"#, Preferences { theme: Theme::Dark, ..usual }),
+            (r#"{"color_map":99,"motion":"Less"}"#, Preferences { motion: Motion::Less, ..usual }),
+            (r#"{"text_size":1e300,"color_map":1}"#, Preferences { color_map: 1, ..usual }),
+            ("[1]", usual),
+            ("{", usual),
+        ] {
+            assert_eq!(Preferences::recalled(kept), expected, "{kept}");
+        }
+        let own =
+            Preferences { theme: Theme::Light, color_map: 2, text_size: 1.15, motion: Motion::Less, explains: true };
+        assert_eq!(Preferences::recalled(&serde_json::to_string(&own).unwrap()), own);
+    }
 }

@@ -208,7 +208,7 @@ pub fn attack(matches: &ArgMatches) -> Result<(), String> {
         );
     }
     say!(
-        "\ncapped, drop: mean hitting times cut at 100 steps a cell, and what the clone loses by them (unknown of a clone with a memory); gap: the same of returns within T."
+        "\ncapped, drop: mean hitting times cut at 100 steps a cell, and what the clone loses by them (unknown of clones with a memory but history); gap: the same of returns within T."
     );
     Ok(())
 }

@@ -142,9 +142,7 @@ fn read(file: &str, longest: usize) -> Result<String, String> {
     if read > longest {
         return Err(long(read));
     }
-    let text = String::from_utf8(bytes).map_err(|_| format!("{file}: expected a text in UTF-8"))?;
-    // Some editors begin a file with a mark of its encoding.
-    Ok(text.strip_prefix('\u{feff}').map(str::to_owned).unwrap_or(text))
+    String::from_utf8(bytes).map_err(|_| format!("{file}: expected a text in UTF-8"))
 }
 
 /// Writes a file whole or not at all, whoever else may be writing it.
@@ -221,8 +219,16 @@ fn ensemble_file(matches: &ArgMatches) -> Result<Opened, String> {
 }
 
 fn evaluate(matches: &ArgMatches) -> Result<(), String> {
-    let Opened { grid, ensemble, horizon, .. } = ensemble_file(matches)?;
-    print(&Figures::of(&grid, &ensemble, horizon))
+    /// What is printed: the figures, and the digest that the file says the ensemble has.
+    #[derive(Serialize)]
+    struct Evaluated {
+        #[serde(skip_serializing_if = "Option::is_none")]
+        digest: Option<Digest>,
+        #[serde(flatten)]
+        figures: Figures,
+    }
+    let Opened { grid, ensemble, horizon, digest } = ensemble_file(matches)?;
+    print(&Evaluated { digest, figures: Figures::of(&grid, &ensemble, horizon) })
 }
 
 fn presets() -> Result<(), String> {
@@ -298,6 +304,9 @@ struct Trained {
     figures: Figures,
 }
 
+/// Most lines of a curve's file, which is written at the end of the run.
+const LONGEST_CURVE: u32 = 1_000_000;
+
 fn train(matches: &ArgMatches) -> Result<(), String> {
     check_out(matches, &["out", "curve"])?;
     let Setup { grid, config, .. } = setup(matches)?;
@@ -305,11 +314,17 @@ fn train(matches: &ArgMatches) -> Result<(), String> {
     let grid = Grid::new(grid).map_err(|error| error.to_string())?;
     let mut trainer = Trainer::new(grid.clone(), config.clone()).map_err(|error| error.to_string())?;
     let curve_file = matches.get_one::<String>("curve");
-    let mut curve = vec![CurvePoint::csv_head()];
+    if let Some(file) = curve_file.filter(|_| config.updates() > LONGEST_CURVE) {
+        return Err(format!(
+            "--curve {file}: a line for each of {} updates, expected at most {LONGEST_CURVE}",
+            config.updates()
+        ));
+    }
+    let mut curve = CurvePoint::csv_head() + "\n";
     for _ in 0..config.updates() {
         trainer.update();
         if curve_file.is_some() {
-            curve.push(CurvePoint::of(&mut trainer).csv_line());
+            curve += &(CurvePoint::of(&mut trainer).csv_line() + "\n");
         }
     }
     let ensemble = trainer.ensemble();
@@ -319,7 +334,7 @@ fn train(matches: &ArgMatches) -> Result<(), String> {
         write(file, &(text.map_err(|error| error.to_string())? + "\n"))?;
     }
     if let Some(file) = curve_file {
-        write(file, &(curve.join("\n") + "\n"))?;
+        write(file, &curve)?;
     }
     let point = CurvePoint::of(&mut trainer);
     print(&Trained {
