@@ -43,7 +43,7 @@ struct Shown {
 struct Announcer {
     element: Element,
     /// What is live on the page, each with its words.
-    live: HashMap<NodeId, String>,
+    live: Vec<(NodeId, String)>,
     /// What is still to be said.
     waiting: Vec<(NodeId, String)>,
     /// When it last spoke, in seconds.
@@ -57,7 +57,7 @@ impl Mirror {
     /// `parent`: the empty element that will hold the mirror; `announcer`: the live region.
     pub fn new(parent: Element, announcer: Element, hands: Hands) -> Mirror {
         let announcer =
-            Announcer { element: announcer, live: HashMap::default(), waiting: Vec::new(), spoke: f64::NEG_INFINITY };
+            Announcer { element: announcer, live: Vec::new(), waiting: Vec::new(), spoke: f64::NEG_INFINITY };
         let elements = Elements { parent, shown: HashMap::default(), children: HashMap::default(), announcer };
         MIRROR.set(Some((elements, hands)));
         Mirror(())
@@ -107,7 +107,7 @@ impl Elements {
         let mut order = Vec::with_capacity(nodes.len());
         let mut children = HashMap::from_iter([(None, Vec::new())]);
         let mut owners = HashMap::default();
-        let mut live = HashMap::default();
+        let mut live = Vec::new();
         let mut stack = vec![(root, None)];
         while let Some((id, mut parent)) = stack.pop() {
             let Some(&node) = nodes.get(&id) else { continue };
@@ -124,7 +124,7 @@ impl Elements {
                     children.entry(parent).or_default();
                 }
                 if node.live() == Some(Live::Polite) {
-                    live.insert(id, aria::text(node).to_owned());
+                    live.push((id, aria::text(node).to_owned()));
                 }
                 self.show_node(id, kind, node, relations, zoom);
             }
@@ -210,15 +210,13 @@ impl Elements {
 }
 
 impl Announcer {
-    /// Takes in what is live now; what is new among it is said, the latest of each node.
-    fn hear(&mut self, live: HashMap<NodeId, String>, ctx: &Context) {
-        for (id, words) in &live {
-            if self.live.get(id) != Some(words) {
-                self.waiting.retain(|(waiting, _)| waiting != id);
-                self.waiting.push((*id, words.clone()));
-            }
+    /// Takes in what is live now, in the order of the page; what is new among it is said, the latest of each node.
+    fn hear(&mut self, live: Vec<(NodeId, String)>, ctx: &Context) {
+        for new in live.iter().filter(|new| !self.live.contains(new)) {
+            self.waiting.retain(|(waiting, _)| *waiting != new.0);
+            self.waiting.push(new.clone());
         }
-        self.waiting.retain(|(id, _)| live.contains_key(id));
+        self.waiting.retain(|(waiting, _)| live.iter().any(|(id, _)| id == waiting));
         self.live = live;
         if self.waiting.is_empty() {
             return;

@@ -1,5 +1,6 @@
 //! Made-up input for everything that strangers may hand to the program: fuzz/ says what, this runs each for a while.
 
+use std::path::Path;
 use std::process::Stdio;
 
 use crate::steps::say;
@@ -26,10 +27,11 @@ pub fn fuzz(arguments: &[&str]) -> Result<(), Failure> {
         _ => return Err(USAGE.trim_end().to_owned()),
     };
     tools::install(&[Tool::CargoFuzz])?;
-    // The crates of the page in the versions of the page.
-    let lock = root().join("fuzz/Cargo.lock");
-    if !lock.exists() {
-        std::fs::copy(root().join("Cargo.lock"), &lock).map_err(|error| format!("{}: {error}", lock.display()))?;
+    // The crates of the page in the versions of the page; cargo adds the few that only the fuzzer has.
+    let (ours, lock) = (root().join("Cargo.lock"), root().join("fuzz/Cargo.lock"));
+    let modified = |file: &Path| std::fs::metadata(file).and_then(|data| data.modified()).ok();
+    if modified(&lock) < modified(&ours) {
+        std::fs::copy(&ours, &lock).map_err(|error| format!("{}: {error}", lock.display()))?;
     }
     run("cargo", &["fmt", "--manifest-path", "fuzz/Cargo.toml", "--check"])?;
     say("building the fuzz targets (5 minutes at first)");

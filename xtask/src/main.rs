@@ -166,6 +166,9 @@ fn build() -> Result<(), Failure> {
     tools::install(&tools::PAGE)?;
     tools::install(&[Tool::WasmOpt])?;
     build_page()?;
+    // It lists what changes now: who stops here has a page without one, not with a wrong one.
+    let list = dist().join(offline::NAME);
+    std::fs::remove_file(&list).map_err(|error| format!("{}: {error}", list.display()))?;
     for file in wasm_files()? {
         let name = file.to_string_lossy();
         steps::say(&format!("wasm-opt on {name} (under a minute)"));
@@ -223,8 +226,9 @@ fn end_to_end_tests() -> Result<Vec<PathBuf>, Failure> {
 /// The digests of tests/golden, which the tests compare with a checked build, from an optimised one.
 fn release() -> Result<(), Failure> {
     const TABLE: &str = include_str!("../../tests/golden/presets.csv");
-    let ape =
-        ["run", "--quiet", "--release", "--no-default-features", "--features", "cli", "--bin", "ape", "--", "train"];
+    const APE: [&str; 6] = ["--release", "--no-default-features", "--features", "cli", "--bin", "ape"];
+    run("cargo", &[&["build"][..], &APE].concat())?;
+    let ape = [&["run", "--quiet"][..], &APE, &["--", "train"]].concat();
     for line in TABLE.lines().skip(1) {
         let [preset, seed, digest] = line.split(',').collect::<Vec<_>>()[..] else {
             return Err(format!("tests/golden/presets.csv: {line}: expected a preset, a seed and a digest"));
@@ -239,14 +243,21 @@ fn release() -> Result<(), Failure> {
     Ok(())
 }
 
-/// Looks for known faults of the crates. The database of them is not among the crates: where it cannot be fetched, the
-/// tests say so and go on.
+/// Looks for known faults of the crates. The database of them is not among the crates: where it can be neither fetched nor
+/// found as it was fetched before, the tests say so and go on.
 fn advisories() -> Result<(), Failure> {
-    if tools::output("cargo", &["deny", "fetch", "db"]).is_none() {
-        println!("Advisories were not checked: their database, RustSec's on GitHub, could not be fetched.");
-        return Ok(());
+    let is_fetched = tools::output("cargo", &["deny", "fetch", "db"]).is_some();
+    match is_fetched {
+        true => run("cargo", &["deny", "check", "--hide-inclusion-graph", "advisories"]),
+        false if tools::has_advisories() => {
+            println!("The database of advisories, RustSec's on GitHub, could not be fetched: an older one is used.");
+            run("cargo", &["deny", "--offline", "check", "--hide-inclusion-graph", "advisories"])
+        }
+        false => {
+            println!("Advisories were not checked: their database, RustSec's on GitHub, could not be fetched.");
+            Ok(())
+        }
     }
-    run("cargo", &["deny", "check", "--hide-inclusion-graph", "advisories"])
 }
 
 fn test(arguments: &[&str]) -> Result<(), Failure> {
@@ -255,11 +266,11 @@ fn test(arguments: &[&str]) -> Result<(), Failure> {
     let is_long = arguments.contains(&"--long");
     let only: Vec<&str> = arguments.iter().copied().filter(|argument| *argument != "--long").collect();
     let mut steps = Steps::new(&only);
-    steps.step("fmt", "seconds", &[], || run("cargo", &["fmt", "--all", "--check"]));
-    steps.step("clippy", "2 minutes at first", &[], || {
+    steps.step("fmt", "seconds", &[Tool::RustComponents], || run("cargo", &["fmt", "--all", "--check"]));
+    steps.step("clippy", "2 minutes at first", &[Tool::RustComponents], || {
         run("cargo", &[&["clippy", "--workspace", "--all-targets"][..], &DENY].concat())
     });
-    steps.step("clippy-wasm", "2 minutes at first", &[Tool::WasmTarget], || {
+    steps.step("clippy-wasm", "2 minutes at first", &[Tool::RustComponents, Tool::WasmTarget], || {
         let page = ["clippy", "--no-default-features", "--features", "page", "--tests", "--lib", "--bins"];
         run("cargo", &[&page[..], &WASM, &DENY].concat())
     });

@@ -11,7 +11,7 @@ use sha2::{Digest, Sha256};
 
 use crate::{Failure, root};
 
-const NAME: &str = "service_worker.js";
+pub const NAME: &str = "service_worker.js";
 const PAGE: &str = "index.html";
 /// What hosts read and do not serve.
 pub const HEADERS: &str = "_headers";
@@ -33,7 +33,10 @@ pub fn write(folder: &Path) -> Result<(), Failure> {
     }
     // A map of plain strings looks the same in Rust and in JavaScript.
     let body = format!("const FILES = {files:#?};\n{template}");
-    let version: String = Sha256::digest(&body).iter().take(8).map(|byte| format!("{byte:02x}")).collect();
+    // What the cache keeps of a file has the headers that it came with.
+    let headers = std::fs::read_to_string(folder.join(HEADERS)).unwrap_or_default();
+    let hash = Sha256::digest(body.clone() + &headers);
+    let version: String = hash.iter().take(8).map(|byte| format!("{byte:02x}")).collect();
     write_file(&folder.join(NAME), &format!("const VERSION = {version:?};\n{body}"))
 }
 

@@ -19,6 +19,7 @@ const CARGO_FUZZ: &str = "0.13.2";
 
 #[derive(Clone, Copy)]
 pub enum Tool {
+    RustComponents,
     WasmTarget,
     Trunk,
     WasmBindgen,
@@ -36,13 +37,15 @@ pub enum Tool {
 /// What building and serving the page needs.
 pub const PAGE: [Tool; 3] = [Tool::WasmTarget, Tool::Trunk, Tool::WasmBindgen];
 
-/// What the tests need.
-pub const ALL: [Tool; 8] = [
+/// What building for publishing and the tests need.
+pub const ALL: [Tool; 10] = [
+    Tool::RustComponents,
     Tool::CargoDeny,
     Tool::WasmTarget,
     Tool::Trunk,
     Tool::WasmBindgen,
     Tool::WasmPack,
+    Tool::WasmOpt,
     Tool::Chromium,
     Tool::Node,
     Tool::NodePackages,
@@ -50,6 +53,7 @@ pub const ALL: [Tool; 8] = [
 
 pub fn install(tools: &[Tool]) -> Result<(), Failure> {
     tools.iter().try_for_each(|tool| match tool {
+        Tool::RustComponents => rust_components(),
         Tool::WasmTarget => wasm_target(),
         Tool::Trunk => cargo_program("trunk", "trunk", TRUNK, true, "4 minutes"),
         // Without --locked: the lock file it was published with names a withdrawn crate.
@@ -74,7 +78,7 @@ pub fn install(tools: &[Tool]) -> Result<(), Failure> {
 
 /// Where our own copies of cargo programs live.
 fn home() -> PathBuf {
-    let cache = std::env::var_os("XDG_CACHE_HOME").map(PathBuf::from);
+    let cache = std::env::var_os("XDG_CACHE_HOME").filter(|folder| !folder.is_empty()).map(PathBuf::from);
     let user = std::env::var_os("HOME").or_else(|| std::env::var_os("USERPROFILE")).map(PathBuf::from);
     cache.or(user.map(|user| user.join(".cache"))).unwrap_or_else(|| root().join("target")).join("ape-lab")
 }
@@ -94,6 +98,25 @@ fn find(name: &str) -> Option<PathBuf> {
 pub fn output(name: &str, arguments: &[&str]) -> Option<String> {
     let output = program(name, arguments).stderr(Stdio::null()).output().ok()?;
     output.status.success().then(|| String::from_utf8_lossy(&output.stdout).trim().to_owned())
+}
+
+/// The formatter and the linter, which rustup's smallest profile leaves out.
+fn rust_components() -> Result<(), Failure> {
+    if ["fmt", "clippy"].iter().all(|name| output("cargo", &[name, "--version"]).is_some()) {
+        return Ok(());
+    }
+    say("adding rustfmt and clippy to Rust (seconds)");
+    run("rustup", &["component", "add", "rustfmt", "clippy"])
+        .map_err(|failure| format!("{failure}; without rustup, install rustfmt and clippy of your Rust by hand"))
+}
+
+/// Whether cargo-deny has fetched the database of known faults at some time.
+pub fn has_advisories() -> bool {
+    let user = || std::env::var_os("HOME").or_else(|| std::env::var_os("USERPROFILE"));
+    let cargo =
+        std::env::var_os("CARGO_HOME").map(PathBuf::from).or(user().map(|user| Path::new(&user).join(".cargo")));
+    let entries = cargo.and_then(|cargo| std::fs::read_dir(cargo.join("advisory-dbs")).ok());
+    entries.is_some_and(|entries| entries.flatten().any(|entry| entry.path().join("crates").is_dir()))
 }
 
 fn wasm_target() -> Result<(), Failure> {
@@ -206,16 +229,25 @@ fn chromium_and_driver() -> Result<(), Failure> {
     if chromium().is_ok() && chromedriver().is_ok() {
         return Ok(());
     }
-    apt(&["chromium", "chromium-driver"], "the browser tests need Chromium and its driver")
+    let why = "the browser tests need Chromium or Chrome and its driver, on PATH or named by CHROMIUM and CHROMEDRIVER";
+    apt(&["chromium", "chromium-driver"], why)
 }
 
 fn node() -> Result<(), Failure> {
-    let major = output("node", &["--version"])
-        .and_then(|line| line.trim_start_matches('v').split('.').next()?.parse::<u32>().ok());
-    if major.is_some_and(|major| major >= 18) && find("npm").is_some() {
+    // The first versions with --test-concurrency.
+    let why = "the browser tests need Node.js 18.19, 20.10 or later and npm";
+    let is_there = || {
+        let version = output("node", &["--version"]).unwrap_or_default();
+        let mut parts = version.trim_start_matches('v').split('.').map_while(|part| part.parse::<u32>().ok());
+        let version = (parts.next().unwrap_or(0), parts.next().unwrap_or(0));
+        let is_new = version >= (20, 10) || (version >= (18, 19) && version < (19, 0));
+        is_new && find("npm").is_some()
+    };
+    if is_there() {
         return Ok(());
     }
-    apt(&["nodejs", "npm"], "the browser tests need Node.js 18 or later and npm")
+    apt(&["nodejs", "npm"], why)?;
+    if is_there() { Ok(()) } else { Err(format!("{why}; what apt-get has is older")) }
 }
 
 /// Python with what makes virtual environments: Debian has that in a package of its own.
