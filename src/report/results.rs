@@ -9,7 +9,7 @@ use std::time::Instant;
 use rayon::prelude::*;
 
 use crate::ape::observer::ObserverChoice;
-use crate::ape::{AlgorithmKind, Config, Ensemble, EnsembleFile, Trainer};
+use crate::ape::{AlgorithmKind, Config, Digest, Ensemble, EnsembleFile, Trainer};
 use crate::attack::{AttackerChoice, Target};
 use crate::experiment::{
     Attack, CurvePoint, METHODS, Outcome, PRESETS, Setup, Summary, Sweep, SweepRun, Table1, Task, ensemble_returns,
@@ -53,7 +53,7 @@ pub fn results(run: Run) -> Result<Vec<(String, String)>, String> {
     let sections = [
         pictures(&mut document)?,
         table1(&mut document, run)?,
-        beta_table(run)?,
+        beta_table(&mut document, run)?,
         pareto(&mut document, run)?,
         benches(&mut document, run)?,
         learning_curve(&mut document, run)?,
@@ -114,6 +114,11 @@ fn grid() -> Grid {
     Grid::new(GridSpec::default()).expect("the paper's grid is valid")
 }
 
+/// What stands under a picture of a run: which it is.
+fn caption(words: &str, digest: Digest) -> Vec<String> {
+    vec![format!("ape-lab {}, {words}, seed 1, digest {digest}", env!("CARGO_PKG_VERSION"))]
+}
+
 /// A whole run.
 fn train(config: Config) -> Result<Trainer, String> {
     let mut trainer = Trainer::new(grid(), config).map_err(|error| error.to_string())?;
@@ -142,7 +147,8 @@ fn pictures(document: &mut Document) -> Result<String, String> {
         ("pg-ape", "PG-APE, 732 updates", Config::default()),
         ("exact-ape", "exact APE, 1,500 updates (ours)", exact()),
     ] {
-        let ensemble = train(config)?.ensemble();
+        let trainer = train(config)?;
+        let (ensemble, caption) = (trainer.ensemble(), caption(&format!("{title}, β = 0.6"), trainer.digest()));
         let grid = grid();
         let mut solver = Solver::new(&grid);
         let target = Target { grid: &grid, ensemble: &ensemble, horizon: HORIZON, seed: 1 };
@@ -174,7 +180,7 @@ fn pictures(document: &mut Document) -> Result<String, String> {
             })
             .collect();
         let _ = writeln!(text, "**{title}**\n");
-        text += &document.picture(name, title, heatmaps(&grid, &panels, &COLOR_MAPS[0], &[]));
+        text += &document.picture(name, title, heatmaps(&grid, &panels, &COLOR_MAPS[0], &caption));
         text += "\n";
     }
     text += "The experts go opposite ways where it hurts; the clone that weighs them equally undoes one with the other. Whoever \
@@ -249,13 +255,17 @@ fn table1(document: &mut Document, run: Run) -> Result<String, String> {
     Ok(text)
 }
 
-fn beta_table(run: Run) -> Result<String, String> {
+fn beta_table(document: &mut Document, run: Run) -> Result<String, String> {
     let mut text = "## The table of β in the paper's source\n\nA table that is commented out in the paper's LaTeX, 3 seeds; clones \
                     without a cap, as no capped return can be below −100. Ours are against `uniform`.\n"
         .to_owned();
     let betas: Vec<f64> = Sweep::PAPER.iter().map(|(beta, _)| *beta).collect();
     let long = Config { total_steps: 4000 * 4096, ..Config::default() };
-    let runs = [("PG-APE, 732 updates", Config::default()), ("PG-APE, 4,000 updates", long), ("exact APE", exact())];
+    let runs = [
+        ("PG-APE, 732 updates", "betas-732", Config::default()),
+        ("PG-APE, 4,000 updates", "betas-4000", long),
+        ("exact APE", "betas-exact", exact()),
+    ];
     let mut head = words(&["", "β"]);
     head.extend(words(&["ensemble, capped", "clone, capped", "clone, uncapped", "clone within T"]));
     let mut rows: Vec<Vec<String>> = Vec::new();
@@ -269,8 +279,9 @@ fn beta_table(run: Run) -> Result<String, String> {
             String::new(),
         ]);
     }
-    for (title, config) in runs {
+    for (title, file, config) in runs {
         let sweep = sweep(config, &betas, 3, run)?;
+        document.csv(file, sweep.csv());
         let (capped, uncapped, within) = (sweep.points(CAPPED), sweep.points(UNCAPPED), sweep.points(WITHIN_T));
         for ((capped, uncapped), within) in capped.iter().zip(&uncapped).zip(&within) {
             rows.push(vec![
@@ -288,7 +299,8 @@ fn beta_table(run: Run) -> Result<String, String> {
              hundreds. They are not the same figures. At the length of run that the paper gives, 732 updates, our policy gradient is \
              still some steps away from −9 even for β = 0, and the clone is hardly hurt below β = 0.3; after 4,000 updates the \
              ensembles are closer to the paper's, and the clone is lost from β = 0.2 or 0.3 on, more than the paper's. \
-             Exact gradients part the experts already at β = 0.1. (Intervals of 3 seeds are no wider than their range.)\n";
+             Exact gradients part the experts already at β = 0.1. (Intervals of 3 seeds are no wider than their range.) Every run: \
+             [732 updates](results/betas-732.csv), [4,000](results/betas-4000.csv), [exact](results/betas-exact.csv).\n";
     Ok(text)
 }
 
@@ -450,7 +462,7 @@ fn learning_curve(document: &mut Document, run: Run) -> Result<String, String> {
     let file = EnsembleFile::new(trainer.grid(), &trainer.ensemble(), None);
     let own = ensemble_returns(trainer.grid(), &trainer.ensemble(), HORIZON).horizon_return;
     let mut series = Vec::new();
-    let mut csv = "attacker,pairs,seed,capped_return,horizon_return,success\n".to_owned();
+    let mut csv = "attacker,pairs,seed,capped_return,horizon_return,success,digest\n".to_owned();
     let mut text = "## How much data a cloner needs\n\nBehaviour cloning of the ensemble above (PG-APE against `uniform`, seed 1) \
                     from ever more pairs, five sets of demonstrations each: trained as in the paper, and in closed form.\n\n"
         .to_owned();
@@ -465,11 +477,12 @@ fn learning_curve(document: &mut Document, run: Run) -> Result<String, String> {
                 found.push(r.horizon_return);
                 let _ = writeln!(
                     csv,
-                    "{name},{},{seed},{},{},{}",
+                    "{name},{},{seed},{},{},{},{}",
                     attack.attacker.parameter(),
                     r.capped_return.unwrap_or(f64::NAN),
                     r.horizon_return,
-                    r.success
+                    r.success,
+                    trainer.digest()
                 );
             }
         }
@@ -522,6 +535,7 @@ fn memory(document: &mut Document, run: Run) -> Result<String, String> {
         .to_owned();
     let head = words(&[
         "seed",
+        "digest",
         "ensemble within T",
         "`uniform`",
         "`gru(1)`",
@@ -532,7 +546,8 @@ fn memory(document: &mut Document, run: Run) -> Result<String, String> {
     let runs: Vec<Vec<String>> = (1..=3u32)
         .into_par_iter()
         .map(|seed| {
-            let ensemble = train(Config { seed, ..Config::default() })?.ensemble();
+            let trainer = train(Config { seed, ..Config::default() })?;
+            let ensemble = trainer.ensemble();
             let own = ensemble_returns(&grid(), &ensemble, HORIZON).horizon_return;
             let blind = attack(&ensemble, "uniform")?.horizon_return;
             let learned = ["gru(1)", "gru(4)", "gru(16)"].map(|name| attack(&ensemble, name));
@@ -541,6 +556,7 @@ fn memory(document: &mut Document, run: Run) -> Result<String, String> {
             let shown = |r: &KnownReturns| format!("{} ± {:.2}", number(r.horizon_return, 2), r.horizon_error);
             Ok(vec![
                 seed.to_string(),
+                format!("`{}`", trainer.digest()),
                 number(own, 2),
                 number(blind, 2),
                 shown(&one),
@@ -587,7 +603,7 @@ fn constraint(document: &mut Document) -> Result<String, String> {
     let runs = [("PG-APE, 732 updates", Config::default()), ("PG-APE, 2,197 updates", long), ("exact APE", exact())];
     let cases: Vec<(&str, Config, f64)> =
         runs.iter().flat_map(|(title, config)| alphas.map(|alpha| (*title, config.clone(), alpha))).collect();
-    let paths: Vec<(Vec<CurvePoint>, u32)> = cases
+    let paths: Vec<(Vec<CurvePoint>, Digest)> = cases
         .par_iter()
         .map(|(_, config, alpha)| {
             let config = Config { alpha: Some(*alpha), ..config.clone() };
@@ -600,10 +616,10 @@ fn constraint(document: &mut Document) -> Result<String, String> {
                     path.push(CurvePoint::of(&mut trainer));
                 }
             }
-            Ok((path, updates))
+            Ok((path, trainer.digest()))
         })
         .collect::<Result<_, String>>()?;
-    let row = |((title, _, alpha), (path, _)): (&(&str, Config, f64), &(Vec<CurvePoint>, u32))| {
+    let row = |((title, _, alpha), (path, digest)): (&(&str, Config, f64), &(Vec<CurvePoint>, Digest))| {
         let last = path.last()?;
         let is_kept = if last.ensemble.horizon_return >= alpha - 0.1 { "yes" } else { "no" };
         Some(vec![
@@ -614,9 +630,10 @@ fn constraint(document: &mut Document) -> Result<String, String> {
             number(last.ensemble.horizon_return - alpha, 2),
             number(last.clone.horizon_return, 2),
             number(last.beta, 3),
+            format!("`{digest}`"),
         ])
     };
-    let head = words(&["", "α", "ensemble", "kept (to 0.1)", "unused", "clone", "β at the end"]);
+    let head = words(&["", "α", "ensemble", "kept (to 0.1)", "unused", "clone", "β at the end", "digest"]);
     table(&mut text, &head, cases.iter().zip(&paths).filter_map(row));
     let colors = [TEAL, PURPLE, ORANGE, GREY, [0x2b, 0x5f, 0xb0]];
     let of_exact = cases.iter().zip(&paths).filter(|((title, ..), _)| *title == "exact APE");
@@ -659,16 +676,16 @@ fn semantics(document: &mut Document) -> Result<String, String> {
     ];
     let kinds = [("PG-APE", AlgorithmKind::PgApe), ("exact", AlgorithmKind::Exact)];
     let cases: Vec<_> = cases.iter().flat_map(|case| kinds.map(|kind| (*case, kind))).collect();
-    let found: Vec<(CurvePoint, Ensemble)> = cases
+    let found: Vec<(CurvePoint, Ensemble, Digest)> = cases
         .par_iter()
         .map(|((_, reward), (_, algorithm))| {
             let adversary_reward = Some(reward.parse().map_err(|error| format!("{error}"))?);
             let config = Config { beta: 1.0, algorithm: *algorithm, adversary_reward, ..Config::default() };
             let mut trainer = train(config)?;
-            Ok((CurvePoint::of(&mut trainer), trainer.ensemble()))
+            Ok((CurvePoint::of(&mut trainer), trainer.ensemble(), trainer.digest()))
         })
         .collect::<Result<_, String>>()?;
-    let rows = cases.iter().zip(&found).map(|(((aim, reward), (algorithm, _)), (point, _))| {
+    let rows = cases.iter().zip(&found).map(|(((aim, reward), (algorithm, _)), (point, _, digest))| {
         let denied = point.denied.unwrap_or(crate::experiment::Denied { ensemble: f64::NAN, clone: f64::NAN });
         vec![
             (*aim).to_owned(),
@@ -677,13 +694,14 @@ fn semantics(document: &mut Document) -> Result<String, String> {
             number(point.ensemble.horizon_return, 2),
             number(denied.ensemble, 2),
             number(denied.clone, 2),
+            format!("`{digest}`"),
         ]
     });
-    let head = words(&["aim", "r̃", "algorithm", "ensemble within T", "Σ r̃ of an expert", "Σ r̃ of the clone"]);
+    let head = words(&["aim", "r̃", "algorithm", "ensemble within T", "Σ r̃ of an expert", "Σ r̃ of the clone", "digest"]);
     table(&mut text, &head, rows);
     let grid = grid();
     let mut solver = Solver::new(&grid);
-    let ensemble = &found[1].1;
+    let (_, ensemble, digest) = &found[1];
     let mut policies = Vec::new();
     for (index, policy) in ensemble.policies().iter().enumerate() {
         policies.push((format!("Expert {}", index + 1), policy.clone(), solver.evaluate(policy, HORIZON)));
@@ -705,7 +723,7 @@ fn semantics(document: &mut Document) -> Result<String, String> {
     text += &document.picture(
         "lured",
         "Experts and the clone that they lure to the top right corner",
-        heatmaps(&grid, &panels, &COLOR_MAPS[0], &[]),
+        heatmaps(&grid, &panels, &COLOR_MAPS[0], &caption("exact APE, β = 1, r̃ 0,9=-1", *digest)),
     );
     text += "\nThe first row of the table, exact: the clone is led to the top right corner and stays there.\n";
     Ok(text)
