@@ -454,6 +454,45 @@ fn a_beta_continued_with_has_no_digest_before_the_run_has_heard_of_it() {
     assert_eq!(page.state().as_ref().unwrap().shown().unwrap().1.digest, digest);
 }
 
+/// A branch of which the session has not heard yet is as long as the session makes it.
+#[test]
+fn a_branch_is_as_long_whether_or_not_its_worker_is_lost() {
+    for is_lost in [false, true] {
+        let (mut page, here) = open(1280.0, 800.0);
+        page.state_mut().as_mut().unwrap().seek(700);
+        until(&mut page, "paused at update 700 of 732");
+        here.0.borrow_mut().hangs = is_lost;
+        page.state_mut().as_mut().unwrap().continue_with(0.3);
+        assert_eq!(page.state().as_ref().unwrap().setup().updates(), 700 + 366);
+        if is_lost {
+            page.run_steps(60);
+            here.0.borrow_mut().events = VecDeque::from([Err("The worker has stopped.".to_owned())]);
+            here.0.borrow_mut().hangs = false;
+            page.run_steps(6);
+        }
+        until(&mut page, "trained, update 1066 of 1066");
+        let (_, snapshot) = page.state().as_ref().unwrap().shown().unwrap();
+        assert_eq!((snapshot.beta, snapshot.course.turns.clone()), (0.3, vec![(700, 0.3)]));
+    }
+}
+
+/// A key that is held down asks a slow worker for no more than a few updates.
+#[test]
+fn updates_one_by_one_are_few_at_a_time() {
+    let (mut page, here) = open(1280.0, 800.0);
+    let steps = || here.0.borrow().commands.iter().filter(|command| **command == Command::Step).count();
+    for expected in [4, 8] {
+        here.0.borrow_mut().hangs = true;
+        for _ in 0..20 {
+            page.key_press(egui::Key::S);
+            page.step();
+        }
+        assert_eq!(steps(), expected);
+        here.0.borrow_mut().hangs = false;
+        settle(&mut page);
+    }
+}
+
 /// Pictures from before a move of β do not take it back.
 #[test]
 fn a_beta_on_its_way_is_not_taken_back() {

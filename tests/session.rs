@@ -536,11 +536,23 @@ fn a_long_way_back_does_not_hold_the_session() {
     let turns = (1..20).find(|_| desk.advance() != Pace::Now || desk.snapshots.len() > taken).unwrap();
     assert_eq!((turns, desk.last().update), (5, 5));
     assert_eq!(desk.last().digest, digest_after(short(), 5));
-    // What needs the moment has it, whatever it takes.
+    // What needs the moment waits for it, and so does what comes after; the session goes on hearing.
     desk.send(Command::Seek { run, update: 6 });
     desk.send(Command::Export);
+    let later = [Command::Seek { run, update: 3 }, Command::Seek { run, update: 7 }, Command::Step, Command::Pause];
+    later.into_iter().for_each(|command| desk.send(command));
+    assert_eq!((desk.advance(), desk.exported.len(), desk.last().update), (Pace::Now, 0, 5));
     desk.run(100_000.0);
-    assert_eq!((desk.exported.len(), desk.last().update), (1, 6));
+    assert_eq!((desk.exported.len(), desk.exported[0].update), (1, 6));
+    assert_eq!((desk.last().update, desk.last().digest), (8, digest_after(short(), 8)));
+    assert!(desk.snapshots.iter().all(|snapshot| snapshot.update != 3));
+    // A new run waits for nothing that the old one was to do, but for its ensemble.
+    desk.send(Command::Seek { run, update: 6 });
+    desk.send(Command::Play);
+    desk.load(short(), false);
+    desk.run(100_000.0);
+    assert_eq!((desk.last().run, desk.last().update, desk.last().state), (run + 1, 0, RunState::Paused));
+    assert_eq!(desk.refused, [""; 0]);
 }
 
 #[test]

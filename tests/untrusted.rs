@@ -106,19 +106,36 @@ fn no_update_takes_for_ever() {
         batch_steps,
         ..Config::default()
     };
-    for config in [gru(4, 100, 4096), gru(32, 200, 12_500), gru(1, 6400, 400_000)] {
+    for config in [gru(4, 100, 4096), gru(32, 200, 12_500), gru(1, 888, 55_555)] {
         assert_eq!(config.check(), Ok(()));
     }
-    // 25 and 86 seconds of work.
-    for config in [gru(32, 100, 1_000_000), gru(32, 10_000, 4096)] {
+    // 25, 86 and 6 seconds of work.
+    for config in [gru(32, 100, 1_000_000), gru(32, 10_000, 4096), gru(1, 6400, 4096)] {
         let sentence = config.check().unwrap_err().to_string();
-        let expected = "observer gru(32): must be one with units · horizon of at most 6400 and units · batch_steps of at most 400000";
-        assert_eq!(sentence, expected);
+        let expected =
+            "must be one with (units + 8) · horizon of at most 8000 and (units + 8) · batch_steps of at most 500000";
+        assert!(sentence.ends_with(expected), "{sentence}");
     }
     let config = Config { batch_steps: 1, total_steps: 4_000_000_000, ..Config::default() };
     let sentence = config.check().unwrap_err().to_string();
     assert_eq!(sentence, "total_steps 4000000000: must be at most 10000000 times batch_steps, which is 1");
     assert_eq!(Config { total_steps: u32::MAX, ..Config::default() }.check(), Ok(()));
+}
+
+/// For every turn all of the configuration was checked: thousands of turns beside a thousand rewards took seconds.
+#[test]
+fn many_turns_of_a_long_configuration_are_checked_at_once() {
+    let reward = vec!["0,1=1"; 1029].join(" ");
+    let config = Config { adversary_reward: Some(reward.parse().unwrap()), ..small().config };
+    let turns = |beta: f64| (0..10_000).map(|update| (update, beta)).collect();
+    let setup = |beta: f64| Setup {
+        course: Course { turns: turns(beta), updates: Some(10_000) },
+        config: config.clone(),
+        ..small()
+    };
+    // A minute before.
+    (0..20).for_each(|_| assert_eq!(setup(0.5).check(), Ok(())));
+    assert_eq!(setup(2.5).check().unwrap_err().to_string(), "config: beta 2.5: must be a number from 0 to 2");
 }
 
 #[test]

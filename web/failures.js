@@ -24,6 +24,10 @@ window.addEventListener("DOMContentLoaded", () => {
     );
   }
 });
+// A file is taken where the canvas is; elsewhere browsers would open it in place of the page.
+for (const kind of ["dragover", "drop"]) {
+  window.addEventListener(kind, (event) => event.dataTransfer?.types.includes("Files") && event.preventDefault());
+}
 window.failLoading = (reason) => {
   if (!window.pageHasStarted) window.failPage("The program could not be loaded (" + reason + "). Reload the page to try again.");
 };

@@ -28,7 +28,13 @@
   function takeOver(waiting) {
     workers.addEventListener("controllerchange", reload);
     // A busy Chromium may put it off for ever, until the old version has served one more worker.
-    const nudge = setTimeout(() => new Worker("./worker_loader.js", { type: "module" }).terminate(), 500);
+    const nudge = setTimeout(() => {
+      try {
+        new Worker("./worker_loader.js", { type: "module" }).terminate();
+      } catch {
+        // start.js, which allows this address, has not come yet.
+      }
+    }, 500);
     return new Promise((resolve) => {
       const { port1, port2 } = new MessageChannel();
       port1.onmessage = () => {

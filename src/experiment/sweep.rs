@@ -53,7 +53,7 @@ pub fn check(config: &Config) -> Result<(), String> {
     })
 }
 
-/// The runs of a sweep, in order of β and seed.
+/// The runs of a sweep, in the order of its β, and of seeds for each.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Sweep {
     pub runs: Vec<SweepRun>,
@@ -86,7 +86,8 @@ impl Sweep {
     /// What the run with this index starts from.
     pub fn setup(setup: &Setup, betas: &[f64], seeds: u32, index: usize) -> Setup {
         let (beta, seed) = Sweep::place(betas, seeds, index);
-        Setup { config: Config { beta, seed, ..setup.config.clone() }, ..setup.clone() }
+        let config = Config { beta, seed, ..setup.config.clone() };
+        Setup { config, grid: setup.grid.clone(), ..Setup::default() }
     }
 
     /// The setups of all β and seeds.
@@ -137,22 +138,22 @@ impl Sweep {
     /// One point for each β, for one kind of return (its place in [`RETURN_KINDS`]); a β is left out where the return
     /// is not known of the clone.
     pub fn points(&self, kind: usize) -> Vec<SweepPoint> {
-        let mut betas: Vec<f64> = self.runs.iter().map(|run| run.beta).collect();
-        betas.sort_by(f64::total_cmp);
-        betas.dedup();
-        let point = |&beta: &f64| {
-            let runs = || self.runs.iter().filter(|run| run.beta == beta);
+        let point = |runs: &[SweepRun]| {
+            let runs = || runs.iter();
             let own: Vec<f64> = runs().map(|run| (RETURN_KINDS[kind].get)(&run.ensemble)).collect();
             let clone: Option<Vec<f64>> = runs().map(|run| run.clone.get(kind)).collect();
             let occupancy: Option<Vec<f64>> = runs().map(|run| run.occupancy.get(kind)).collect();
             Some(SweepPoint {
-                beta,
+                beta: runs().next()?.beta,
                 ensemble: Summary::of(&own)?,
                 clone: Summary::of(&clone?)?,
                 occupancy: Summary::of(&occupancy?)?,
             })
         };
-        betas.iter().filter_map(point).collect()
+        // All seeds of a β stand together.
+        let mut points: Vec<SweepPoint> = self.runs.chunk_by(|a, b| a.beta == b.beta).filter_map(point).collect();
+        points.sort_by(|a, b| a.beta.total_cmp(&b.beta));
+        points
     }
 
     /// A line for each run.

@@ -86,7 +86,8 @@ impl Table1 {
 
     /// The setups of all seeds, from 1.
     pub fn setups(setup: &Setup, seeds: u32) -> Vec<Setup> {
-        let with = |seed| Setup { config: Config { seed, ..setup.config.clone() }, ..setup.clone() };
+        let config = |seed| Config { seed, ..setup.config.clone() };
+        let with = |seed| Setup { config: config(seed), grid: setup.grid.clone(), ..Setup::default() };
         (1..=seeds).map(with).collect()
     }
 

@@ -84,7 +84,7 @@ pub struct Session {
     search: Option<Search>,
     /// A run that is being made again.
     resuming: Option<Resuming>,
-    /// What is to be done with it once it is there.
+    /// What is to be done with it once it is there, or with the moment that is searched for.
     waiting: Vec<Command>,
     outbox: Vec<Event>,
     /// Something has changed since the last snapshot.
@@ -120,13 +120,21 @@ impl Session {
 
     /// Takes a command. What is not possible is refused with a sentence and changes nothing.
     pub fn handle(&mut self, command: Command) {
+        let (is_resuming, is_first) = (self.resuming.is_some(), self.waiting.is_empty());
+        let is_on_its_way = is_resuming || self.seek.is_some() || self.search.is_some();
         let waits = match command {
             Command::Resume { .. } | Command::Speed(_) | Command::Show(_) | Command::Seen(_) => false,
             // A new run takes the place of the old one, and of all that was to be done with it; but its ensemble is waited for.
             Command::Load { .. } | Command::Retrain { .. } => self.waiting.contains(&Command::Export),
-            _ => true,
+            // These take another moment's place, or that of what goes on.
+            Command::Seek { .. } | Command::Pause => is_resuming || !is_first,
+            Command::Play | Command::Step | Command::Continue { .. } | Command::Export => is_on_its_way || !is_first,
         };
-        if self.resuming.is_some() && waits {
+        if waits {
+            // Of two moments one after the other only the last is wanted.
+            if matches!((&command, self.waiting.last()), (Command::Seek { .. }, Some(Command::Seek { .. }))) {
+                self.waiting.pop();
+            }
             return self.waiting.push(command);
         }
         if let Err(sentence) = self.carry_out(command) {
@@ -138,6 +146,9 @@ impl Session {
         match command {
             Command::Load { setup, play } => {
                 self.begin(*setup, play, false)?;
+            }
+            Command::Resume { recorded, .. } if recorded > Config::MOST_UPDATES => {
+                return Err(format!("{recorded} updates: must be at most {}.", Config::MOST_UPDATES));
             }
             Command::Resume { run, setup, recorded, update, is_playing } => {
                 let mut resumed = Run::new(*setup, true, true)?;
@@ -158,7 +169,6 @@ impl Session {
             }
             Command::Continue { beta } => {
                 self.begin_queued()?;
-                self.arrive();
                 self.continue_with(beta)?;
             }
             Command::Seek { run, update } => {
@@ -171,7 +181,6 @@ impl Session {
             }
             Command::Play => {
                 self.begin_queued()?;
-                self.arrive();
                 self.unfinished()?.go_on();
             }
             Command::Pause => {
@@ -181,7 +190,6 @@ impl Session {
             }
             Command::Step => {
                 self.begin_queued()?;
-                self.arrive();
                 let run = self.unfinished()?;
                 (run.is_playing, run.is_silent) = (false, false);
                 run.last_update = run.last_update.max(run.trainer().updates() + 1);
@@ -202,7 +210,6 @@ impl Session {
             }
             Command::Show(cloners) => self.show = cloners,
             Command::Export => {
-                self.arrive();
                 let run = self.run.as_ref().ok_or(NOTHING)?;
                 let exported = run.export(self.runs);
                 self.outbox.push(Event::Exported(Box::new(exported)));
@@ -246,11 +253,6 @@ impl Session {
         setup.config.beta = beta;
         setup.course = Course::default();
         self.begin(setup, true, true)
-    }
-
-    /// Goes to the update that was asked for.
-    fn arrive(&mut self) {
-        self.approach(&|| false);
     }
 
     /// Goes towards the update that was asked for, the last one, until time is over: whether it is there.
@@ -301,7 +303,7 @@ impl Session {
             run.set_course_updates();
             run.curve.clear();
             let (optimal, setup) = (run.optimal.clone(), run.setup.clone());
-            self.runs += 1;
+            self.runs = self.runs.wrapping_add(1);
             let branch_of = Some((runs, update));
             self.outbox.push(Event::Started(Box::new(Started { run: self.runs, setup, optimal, branch_of })));
         }
@@ -312,7 +314,7 @@ impl Session {
     /// Puts a new run in the place of the old one, if its setup is good.
     fn begin(&mut self, setup: Setup, is_playing: bool, is_silent: bool) -> Result<(), String> {
         let mut run = Run::new(setup, is_playing, is_silent)?;
-        self.runs += 1;
+        self.runs = self.runs.wrapping_add(1);
         let (setup, optimal) = (run.setup.clone(), run.optimal.clone());
         self.outbox.push(Event::Started(Box::new(Started { run: self.runs, setup, optimal, branch_of: None })));
         run.add_curve_point();
@@ -343,6 +345,11 @@ impl Session {
         }
         run.is_playing = resuming.is_playing && run.recording.is_some();
         self.resuming = None;
+        self.catch_up();
+    }
+
+    /// Does what had to wait, up to what has to wait again.
+    fn catch_up(&mut self) {
         for command in std::mem::take(&mut self.waiting) {
             self.handle(command);
         }
@@ -355,7 +362,13 @@ impl Session {
         if !self.approach(&|| clock() - now >= STRETCH) {
             return Pace::Now;
         }
+        if self.resuming.is_none() && !self.waiting.is_empty() {
+            self.catch_up();
+        }
         let mut pace = self.train(now, clock);
+        if self.seek.is_some() {
+            pace = Pace::Now;
+        }
         if self.resuming.is_some() {
             self.finish_resuming();
             return Pace::Now;

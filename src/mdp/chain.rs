@@ -166,7 +166,7 @@ fn add(sums: &mut [f64], more: &[f64]) {
     sums.iter_mut().zip(more).for_each(|(sum, more)| *sum += more);
 }
 
-/// T steps of a policy, forwards times backwards; keeps its tables between calls.
+/// T steps of a policy, forwards times backwards; keeps its tables between calls, but for large ones.
 #[derive(Clone, Default)]
 pub struct Prospect {
     /// What is to come with k steps left, k = 0…T − 1.
@@ -179,6 +179,9 @@ pub struct Prospect {
 }
 
 impl Prospect {
+    /// Most numbers of a table that is kept: 8 MB.
+    const MOST_KEPT: usize = 1_000_000;
+
     /// Looks `horizon` steps, 1 at least, ahead and back: each step from s brings `immediate[s]`, `[S]`, arrival `at_goal`.
     pub fn look(&mut self, chain: &Chain, horizon: u32, immediate: &[f64], at_goal: f64) {
         let horizon = horizon as usize;
@@ -214,5 +217,8 @@ impl Prospect {
         };
         self.to_come.clear();
         self.to_come.extend((0..cells).map(|state| std::array::from_fn(|action| sum(state, action))));
+        if horizon * cells > Self::MOST_KEPT {
+            self.ahead = Vec::new();
+        }
     }
 }

@@ -120,6 +120,8 @@ pub enum Session {
 
 /// How long the session may owe an answer before the visitor is offered another, in seconds.
 const PATIENCE: f64 = 10.0;
+/// Single updates that may be on their way: a key that is held down would fill a slow worker's inbox.
+const MOST_STEPS: u32 = 4;
 
 /// How often a session that has died is started again by itself: so many times in so many seconds.
 const MOST_RESTARTS: usize = 3;
@@ -183,6 +185,8 @@ pub struct App {
     pub(super) now: f64,
     /// Snapshots taken in, over all sessions.
     pub(super) taken: u64,
+    /// Single updates that were asked for since.
+    stepped: u32,
     /// A snapshot that has come and not been drawn yet.
     pub(super) undrawn: Option<u32>,
     /// The last snapshot that the session was told has been drawn.
@@ -279,6 +283,7 @@ impl App {
             focus: None,
             now: 0.0,
             taken: 0,
+            stepped: 0,
             undrawn: None,
             seen: 0,
         };
@@ -344,6 +349,9 @@ impl App {
 
     /// Sends a command; while there is no session, none is needed: it will be told everything.
     pub fn send(&mut self, command: Command) {
+        if command == Command::Step && self.stepped >= MOST_STEPS {
+            return;
+        }
         match command {
             Command::Load { play, .. } => self.plays = play,
             Command::Retrain { .. } | Command::Continue { .. } | Command::Play => self.plays = true,
@@ -362,6 +370,7 @@ impl App {
                 // It goes there first, and on at once: that moment may never be seen.
                 self.view.sought = None;
             }
+            self.stepped += u32::from(command == Command::Step);
             self.link.send(&command);
         }
     }
@@ -498,10 +507,14 @@ impl App {
                 return self.send(Command::Continue { beta });
             }
             // The session will say the same.
-            if update >= self.setup.updates() {
-                let last = update.saturating_add(self.setup.config.updates());
-                self.setup.course.updates = Some(last.min(Config::MOST_UPDATES));
-            }
+            let (usual, planned) = (self.setup.config.updates(), self.setup.updates());
+            let last = match () {
+                () if update < shown.snapshot.recorded => planned.max(update.saturating_add(usual / 2)),
+                () if update >= planned => update.saturating_add(usual),
+                () => planned,
+            };
+            let last = last.min(Config::MOST_UPDATES);
+            self.setup.course.updates = Some(last).filter(|&last| last != usual);
             self.setup.course.turn(update, beta);
             self.continued = Some((beta, self.seen.saturating_add(IN_FLIGHT)));
             self.preset = None;
@@ -621,15 +634,17 @@ impl App {
                 },
                 Ok(Event::Refused(sentence)) => {
                     (self.asked, self.continued) = (Asked::Nothing, None);
+                    self.stepped = 0;
                     self.wanted.clear();
                     self.notice = Some(sentence);
                 }
                 Err(sentence) => self.lose_session(sentence),
             }
         }
+        let now = self.clock();
         for (id, event) in self.pool.receive() {
             let batches = [&mut self.bench.batch, &mut self.table1.batch, &mut self.sweep.batch];
-            batches.into_iter().flatten().for_each(|batch| batch.hear(id, &event, self.now));
+            batches.into_iter().flatten().for_each(|batch| batch.hear(id, &event, now));
             self.race.hear(id, &event, self.now);
             self.take_clone(id, event);
         }
@@ -642,6 +657,11 @@ impl App {
         while let Some(sentence) = self.host.failure() {
             self.notice = Some(sentence);
         }
+    }
+
+    /// The time also where no frame tells it.
+    fn clock(&self) -> f64 {
+        self.host.now().unwrap_or(self.now)
     }
 
     /// Takes in the time, and counts how long the session has been silent.
@@ -684,14 +704,15 @@ impl App {
         let was_at_work = matches!(self.session, Session::Ready);
         self.can_resume = !self.is_retraining() && (was_at_work || self.can_resume);
         self.forget_session();
-        self.restarts.retain(|at| self.now - at < WITHIN);
+        let now = self.clock();
+        self.restarts.retain(|at| now - at < WITHIN);
         if !was_at_work || self.restarts.len() >= MOST_RESTARTS {
             self.session = Session::Failed(sentence);
             // It said that another had taken its place.
             self.notice = None;
             return;
         }
-        self.restarts.push(self.now);
+        self.restarts.push(now);
         self.notice = Some(match self.resumption() {
             Some(_) => {
                 let sentence = sentence.trim_end_matches('.');
@@ -712,7 +733,7 @@ impl App {
     /// Nothing more comes of what the session was asked for.
     fn forget_session(&mut self) {
         (self.asked, self.begun, self.continued) = (Asked::Nothing, None, None);
-        (self.silence, self.seen) = (0.0, 0);
+        (self.silence, self.seen, self.stepped) = (0.0, 0, 0);
         self.wanted.clear();
     }
 
@@ -756,6 +777,7 @@ impl App {
     /// Puts a snapshot on the page.
     fn take(&mut self, mut snapshot: Snapshot) {
         self.taken += 1;
+        self.stepped = 0;
         self.undrawn = Some(snapshot.number);
         let points = std::mem::take(&mut snapshot.curve);
         if let Some(started) = self.begun.take_if(|begun| begun.run == snapshot.run) {

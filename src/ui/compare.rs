@@ -77,10 +77,12 @@ fn is_same(one: &Shown, other: &Shown) -> bool {
 fn name(shown: &Shown, file: Option<&str>) -> String {
     let (setup, snapshot) = (&shown.started.setup, &shown.snapshot);
     let config = &setup.config;
-    let beta = snapshot.course.turns.iter().fold(numbers::as_set(config.beta), |text, (update, beta)| {
-        format!("{text}, from {update} on {}", numbers::as_set(*beta))
-    });
-    let beta: String = if snapshot.course.turns.len() > 3 { "β on a course".to_owned() } else { format!("β {beta}") };
+    let turns = &snapshot.course.turns;
+    let turned = |(update, beta): &(u32, f64)| format!(", from {update} on {}", numbers::as_set(*beta));
+    let beta = match turns.len() {
+        0..=3 => format!("β {}{}", numbers::as_set(config.beta), turns.iter().map(turned).collect::<String>()),
+        _ => "β on a course".to_owned(),
+    };
     match setup.ensemble {
         Some(_) => {
             let preset = PRESETS.iter().find(|preset| (preset.setup)() == *setup).map(|preset| preset.title);

@@ -60,6 +60,12 @@ pub trait Host {
         format!("ape-lab {}\n{fault}", env!("CARGO_PKG_VERSION"))
     }
 
+    /// Seconds on the clock of the frames. A page that nobody sees hears of what is done, and draws no frame that would
+    /// tell the time.
+    fn now(&self) -> Option<f64> {
+        None
+    }
+
     /// Gives what is around the page the theme that the visitor prefers.
     fn set_theme(&mut self, _theme: ThemePreference) {}
 

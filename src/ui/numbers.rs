@@ -12,7 +12,7 @@ pub fn decimal(value: f64, decimals: usize) -> String {
 /// How many times as large one number is as another; a dash where that is no number.
 pub fn times(number: f64, other: f64) -> String {
     let ratio = number / other;
-    if ratio.is_finite() { decimal(ratio, 1) + "×" } else { "–".to_owned() }
+    if ratio.is_finite() { steps(ratio) + "×" } else { "–".to_owned() }
 }
 
 /// Steps or a return, short: one decimal, and powers of ten where it is huge.

@@ -46,8 +46,10 @@ impl Preferences {
     /// What was kept, maybe by another version: what is not known here is as usual, and nothing else with it.
     fn recalled(text: &str) -> Preferences {
         let read = |fields: &Map<String, Value>| serde_json::from_value(Value::Object(fields.clone()));
+        let usual = serde_json::to_value(Preferences::default()).unwrap_or_default();
+        let kept: Map<String, Value> = serde_json::from_str(text).unwrap_or_default();
         let mut known = Map::new();
-        for (name, value) in serde_json::from_str::<Map<String, Value>>(text).unwrap_or_default() {
+        for (name, value) in kept.into_iter().filter(|(name, _)| usual.get(name).is_some()) {
             known.insert(name.clone(), value);
             if read(&known).map(|_: Preferences| ()).is_err() {
                 known.remove(&name);
@@ -159,6 +161,9 @@ mod tests {
         ] {
             assert_eq!(Preferences::recalled(kept), expected, "{kept}");
         }
+        // Read in no time, too.
+        let names: Vec<String> = (0..20_000).map(|name| format!("\"{name}\":1")).collect();
+        assert_eq!(Preferences::recalled(&format!("{{{}}}", names.join(","))), usual);
         let own =
             Preferences { theme: Theme::Light, color_map: 2, text_size: 1.15, motion: Motion::Less, explains: true };
         assert_eq!(Preferences::recalled(&serde_json::to_string(&own).unwrap()), own);

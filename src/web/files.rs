@@ -113,12 +113,21 @@ impl Host for Files {
     }
 
     fn keep(&mut self, name: &str, text: &str) -> Result<(), String> {
+        // A reload of this tab comes back to what it had, whatever other tabs have kept since.
+        if let Some(own) = own_storage() {
+            let _ = own.remove_item(&key(name)).and_then(|()| own.set_item(&key(name), text));
+        }
         let storage = storage().ok_or("This browser keeps nothing for the next visit.")?;
         storage.set_item(&key(name), text).map_err(|_| "There is no room left in this browser's storage.".to_owned())
     }
 
     fn kept(&self, name: &str) -> Option<String> {
-        storage()?.get_item(&key(name)).ok()?
+        let kept = |storage: web_sys::Storage| storage.get_item(&key(name)).ok()?;
+        own_storage().and_then(kept).or_else(|| storage().and_then(kept))
+    }
+
+    fn now(&self) -> Option<f64> {
+        Some(web_sys::window()?.performance()?.now() / 1000.0)
     }
 
     fn report(&self, fault: &str) -> String {
@@ -144,6 +153,11 @@ impl Host for Files {
 /// What the page keeps, under names of its own.
 fn storage() -> Option<web_sys::Storage> {
     web_sys::window()?.local_storage().ok()?
+}
+
+/// What this tab alone keeps, until it is closed.
+fn own_storage() -> Option<web_sys::Storage> {
+    web_sys::window()?.session_storage().ok()?
 }
 
 fn key(name: &str) -> String {

@@ -3,7 +3,7 @@
 use egui::{DragValue, RichText, TextEdit, Ui, vec2};
 
 use super::{Batch, exports, introduce, paper_cell, summary_cell};
-use crate::experiment::{Outcome, Setup, Summary, Sweep, SweepPoint, Task};
+use crate::experiment::{Outcome, Summary, Sweep, SweepPoint, Task};
 use crate::mdp::RETURN_KINDS;
 use crate::ui::app::App;
 use crate::ui::chart::{self, Axes, Curve, Style};
@@ -104,20 +104,34 @@ impl SweepTab {
     }
 
     fn begin(&mut self, app: &mut App, now: f64) {
-        if let Some(batch) = self.batch.as_mut().filter(|batch| batch.is_running()) {
-            batch.cancel(&mut app.pool, now);
-        }
-        match Sweep::betas(&self.betas) {
+        match self.asked() {
             Err(sentence) => self.refusal = Some(sentence),
             Ok(betas) => {
                 self.refusal = None;
-                let setup = Setup { ensemble: None, ..app.setup().clone() };
+                if let Some(batch) = self.batch.as_mut().filter(|batch| batch.is_running()) {
+                    batch.cancel(&mut app.pool, now);
+                }
+                let setup = app.setup();
                 self.is_papers = setup.is_papers();
                 let task = |setup| Task::Sweep { setup: Box::new(setup) };
-                let tasks = Sweep::setups(&setup, &betas, self.seeds).into_iter().map(task).collect();
+                let tasks = Sweep::setups(setup, &betas, self.seeds).into_iter().map(task).collect();
                 self.batch = Some(Batch::begin(&mut app.pool, tasks, now));
             }
         }
+    }
+
+    /// The β that are asked for, if they are not too many for a page to show.
+    fn asked(&self) -> Result<Vec<f64>, String> {
+        const MOST_BETAS: usize = 200;
+        const MOST_RUNS: usize = 2000;
+        let betas = Sweep::betas(&self.betas)?;
+        let (count, seeds) = (betas.len(), self.seeds as usize);
+        if count > MOST_BETAS || count * seeds > MOST_RUNS {
+            return Err(format!(
+                "{count} values of β, {seeds} seeds: expected at most {MOST_BETAS} values and {MOST_RUNS} runs in all here; the command ape sweep takes more"
+            ));
+        }
+        Ok(betas)
     }
 
     /// What has come so far.
@@ -199,4 +213,18 @@ fn show_table(ui: &mut Ui, sweep: &Sweep, kind: usize, is_papers: bool) {
     });
     let rows = rows.collect();
     table(ui, "sweep table", &columns, rows);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_page_sweeps_as_much_as_it_can_show() {
+        let asked = |betas: &str, seeds| SweepTab { betas: betas.to_owned(), seeds, ..SweepTab::default() }.asked();
+        assert_eq!(asked("0:1:0.05", 95).unwrap().len(), 21);
+        for (betas, seeds) in [("0:1:0.05", 96), ("0:0.2:0.001", 1)] {
+            assert!(asked(betas, seeds).unwrap_err().contains("at most 200 values and 2000 runs"));
+        }
+    }
 }

@@ -4,7 +4,7 @@ use egui::{DragValue, RichText, Ui};
 
 use super::{Batch, choose_cloners, exports, introduce, paper_cell, summary_cell};
 use crate::attack::AttackerChoice;
-use crate::experiment::{METHODS, Outcome, Setup, Table1, Task};
+use crate::experiment::{METHODS, Outcome, Table1, Task};
 use crate::mdp::RETURN_KINDS;
 use crate::ui::app::App;
 use crate::ui::table::{Cell, Column, table};
@@ -42,11 +42,11 @@ impl Table1Tab {
             ui.add(DragValue::new(&mut self.seeds).range(1..=100).speed(0.1)).accessible_name("Seeds");
             let is_running = self.batch.as_ref().is_some_and(Batch::is_running);
             if ui.add_enabled(!is_running, egui::Button::new("Make Table 1")).clicked() {
-                let setup = Setup { ensemble: None, ..app.setup().clone() };
+                let setup = app.setup();
                 self.is_papers = setup.is_papers_table();
                 self.columns = self.cloners.clone();
                 let task = |setup| Task::Table1 { setup: Box::new(setup), attackers: self.columns.clone() };
-                let tasks = Table1::setups(&setup, self.seeds).into_iter().map(task).collect();
+                let tasks = Table1::setups(setup, self.seeds).into_iter().map(task).collect();
                 self.batch = Some(Batch::begin(&mut app.pool, tasks, ui.input(|input| input.time)));
             }
             let made = self.table();
