@@ -476,6 +476,26 @@ fn a_branch_is_as_long_whether_or_not_its_worker_is_lost() {
     }
 }
 
+/// Who continues with the β that is there makes no branch of it; digest and address stay what they were.
+#[test]
+fn a_run_continued_with_its_own_beta_is_the_same_run() {
+    let desktop = Desktop::default();
+    let (mut page, _here) = open_with(1280.0, 800.0, desktop.clone());
+    let digest = page.state().as_ref().unwrap().shown().unwrap().1.digest;
+    for update in [731, 300] {
+        page.state_mut().as_mut().unwrap().seek(update);
+        until(&mut page, &format!("paused at update {update} of 732"));
+        page.state_mut().as_mut().unwrap().continue_with(0.6);
+        until(&mut page, "trained, update 732 of 732");
+        page.run_steps(60);
+        let app = page.state().as_ref().unwrap();
+        assert!(app.shows_controls() && app.setup().course == Default::default());
+        assert_eq!(app.shown().unwrap().1.digest, digest);
+        let address = desktop.address.borrow();
+        assert!(!address.contains("turns") && !address.contains("updates") && address.contains("digest"), "{address}");
+    }
+}
+
 /// A key that is held down asks a slow worker for no more than a few updates.
 #[test]
 fn updates_one_by_one_are_few_at_a_time() {

@@ -117,7 +117,7 @@ impl App {
     pub(super) fn keep_file(&mut self, name: &str, text: &str) -> Result<(), String> {
         self.host
             .keep(FILE, &format!("{name}\n{text}"))
-            .map_err(|error| format!("{error} A reload will not bring {name} back."))
+            .map_err(|error| format!("{error} The next visit will not bring {name} back."))
     }
 
     /// Shows what an address says; where it is no good, says why and shows the default.

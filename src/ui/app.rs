@@ -352,6 +352,10 @@ impl App {
         if command == Command::Step && self.stepped >= MOST_STEPS {
             return;
         }
+        if matches!(command, Command::Load { .. } | Command::Retrain { .. } | Command::Continue { .. } | Command::Play)
+        {
+            self.stepped = 0;
+        }
         match command {
             Command::Load { play, .. } => self.plays = play,
             Command::Retrain { .. } | Command::Continue { .. } | Command::Play => self.plays = true,
@@ -502,6 +506,12 @@ impl App {
     pub fn continue_with(&mut self, beta: f64) {
         if let Some(shown) = &self.shown {
             let update = shown.snapshot.update;
+            let is_here = self.view.sought.is_none() && !self.is_retraining() && self.continued.is_none();
+            if is_here && shown.snapshot.beta == beta && self.shows_controls() {
+                // No turn, no branch: what is to come has been, or comes as it would have.
+                (self.preset, self.promise) = (None, None);
+                return self.send(Command::Continue { beta });
+            }
             if update >= Config::MOST_UPDATES || self.setup.course.turns.len() >= Course::MOST_TURNS {
                 // It will say why not.
                 return self.send(Command::Continue { beta });

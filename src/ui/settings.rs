@@ -92,7 +92,7 @@ impl App {
             if let Err(sentence) = self.host.keep(NAME, &text)
                 && !std::mem::replace(&mut self.is_forgetful, true)
             {
-                self.notice = Some(format!("{sentence} What you set here holds until the page is reloaded."));
+                self.notice = Some(format!("{sentence} What you set here holds for this visit."));
             }
         }
     }
