@@ -240,7 +240,7 @@ fn node() -> Result<(), Failure> {
         let version = output("node", &["--version"]).unwrap_or_default();
         let mut parts = version.trim_start_matches('v').split('.').map_while(|part| part.parse::<u32>().ok());
         let version = (parts.next().unwrap_or(0), parts.next().unwrap_or(0));
-        let is_new = version >= (20, 10) || (version >= (18, 19) && version < (19, 0));
+        let is_new = version >= (20, 10) || ((18, 19)..(19, 0)).contains(&version);
         is_new && find("npm").is_some()
     };
     if is_there() {
