@@ -301,6 +301,26 @@ test("what is exported comes back with the same figures, and survives a reload",
   await page.reload();
   await says(page, "given ensemble, nothing to train");
   await until(figures, (now) => JSON.stringify(now) === JSON.stringify(before));
+  // So it does where another tab has kept another file since.
+  await page.evaluate(() => localStorage.setItem("ape-lab.ensemble", "other.json\n{}"));
+  await page.reload();
+  await says(page, "given ensemble, nothing to train");
+  await until(figures, (now) => JSON.stringify(now) === JSON.stringify(before));
+  // Dropped beside the picture, a file does not take the place of the page; a text may be dropped into a field.
+  const isStopped = (kind, withFile) =>
+    page.evaluate(
+      ([kind, withFile]) => {
+        const dataTransfer = new DataTransfer();
+        dataTransfer.items.add(...(withFile ? [new File(["{}"], "a.json")] : ["a text", "text/plain"]));
+        const event = new DragEvent(kind, { dataTransfer, bubbles: true, cancelable: true });
+        document.getElementById("message").dispatchEvent(event);
+        return event.defaultPrevented;
+      },
+      [kind, withFile],
+    );
+  for (const kind of ["dragover", "drop"]) {
+    assert.deepEqual([await isStopped(kind, true), await isStopped(kind, false)], [true, false]);
+  }
   // A file that is none changes nothing.
   const again = page.waitForEvent("filechooser", PATIENCE);
   await press(page, "o");

@@ -266,29 +266,71 @@ test("graphics that are lost in the middle of a run, again and again, do not end
   await close();
 });
 
+/** Gives the page `look(away)`, which hides it, and shows it again a minute later. */
+const hide = (page) =>
+  page.addInitScript(() => {
+    // A hidden page has no frames; its clock goes on.
+    let isHidden = false;
+    let skipped = 0;
+    const held = [];
+    const request = window.requestAnimationFrame.bind(window);
+    window.requestAnimationFrame = (callback) => (isHidden ? held.push(callback) : request(callback));
+    const now = performance.now.bind(performance);
+    performance.now = () => now() + skipped;
+    Object.defineProperty(document, "hidden", { get: () => isHidden });
+    Object.defineProperty(document, "visibilityState", { get: () => (isHidden ? "hidden" : "visible") });
+    window.look = (away) => {
+      isHidden = away;
+      if (!away) {
+        skipped += 60_000;
+        held.splice(0).forEach((callback) => request(callback));
+      }
+      document.dispatchEvent(new Event("visibilitychange"));
+    };
+  });
+
+/** Waits until nothing is heard of the workers: twenty looks in a row find nothing new. Returns when they were last heard. */
+async function silence(page) {
+  let [last, looks, at] = [-1, 0, 0];
+  await until(
+    async () => {
+      const now = await page.evaluate(() => window.watch.heard);
+      looks = now === last ? looks + 1 : 0;
+      if (looks === 0) [last, at] = [now, Date.now()];
+      return looks;
+    },
+    (looks) => looks === 20,
+  );
+  return at;
+}
+
+test("an experiment goes on while the page is hidden, and says how long it took", async () => {
+  const { page, problems, close } = await open(browser, site.address, {
+    before: async (page) => {
+      await watched(page);
+      await hide(page);
+    },
+  });
+  await trained(page);
+  await click(page, "radio", "Tab: β sweep");
+  await click(page, "button", "Sweep");
+  await page.getByRole("status").filter({ hasText: /^\d+ %/ }).waitFor(PATIENCE);
+  const begun = Date.now();
+  await page.evaluate(() => window.look(true));
+  const worked = ((await silence(page)) - begun) / 1000;
+  await page.evaluate(() => window.look(false));
+  const done = page.getByRole("status").filter({ hasText: /^done in/ });
+  await done.waitFor(PATIENCE);
+  const text = await done.textContent();
+  // Not as long as the last picture was young, nor with the minute that nobody looked.
+  const [seconds, times] = [/done in ([\d.]+) s/, /([\d.]+) times as fast/].map((part) => Number(text.match(part)?.[1] ?? 1));
+  assert.ok(seconds > worked - 0.5 && seconds < 60 && times <= (await page.evaluate(() => navigator.hardwareConcurrency)), text);
+  assert.deepEqual(problems, []);
+  await close();
+});
+
 test("while the page is hidden training waits, and on return there is no flood", async () => {
   const { digest: end } = await expected();
-  const hide = (page) =>
-    page.addInitScript(() => {
-      // A hidden page has no frames; its clock goes on.
-      let isHidden = false;
-      let skipped = 0;
-      const held = [];
-      const request = window.requestAnimationFrame.bind(window);
-      window.requestAnimationFrame = (callback) => (isHidden ? held.push(callback) : request(callback));
-      const now = performance.now.bind(performance);
-      performance.now = () => now() + skipped;
-      Object.defineProperty(document, "hidden", { get: () => isHidden });
-      Object.defineProperty(document, "visibilityState", { get: () => (isHidden ? "hidden" : "visible") });
-      window.look = (away) => {
-        isHidden = away;
-        if (!away) {
-          skipped += 60_000;
-          held.splice(0).forEach((callback) => request(callback));
-        }
-        document.dispatchEvent(new Event("visibilitychange"));
-      };
-    });
   const { page, problems, close } = await open(browser, site.address + SLOW, {
     before: async (page) => {
       await watched(page);
@@ -301,18 +343,8 @@ test("while the page is hidden training waits, and on return there is no flood",
     const now = performance.now.bind(performance);
     performance.now = () => now() + 60_000;
   });
-  // It falls silent: twenty looks in a row find nothing new.
   const heard = () => page.evaluate(() => window.watch.heard);
-  let [last, looks] = [-1, 0];
-  await until(
-    async () => {
-      const now = await heard();
-      looks = now === last ? looks + 1 : 0;
-      last = now;
-      return looks;
-    },
-    (looks) => looks === 20,
-  );
+  await silence(page);
   const before = await heard();
   const update = await shownUpdate(page);
   await page.evaluate(() => window.look(false));
@@ -381,7 +413,7 @@ for (const [how, script] of [
       await widget(page, "radio", radio).waitFor({ state: "detached", ...PATIENCE });
     };
     await prefer("Theme: dark");
-    await alert(page, "holds until the page is reloaded").waitFor(PATIENCE);
+    await alert(page, "holds for this visit").waitFor(PATIENCE);
     await page.screenshot({ path: SHOTS + `storage-${how}-1280x800-dark.png` });
     await click(page, "button", "Dismiss");
     await until(() => page.getByRole("alert").count(), (count) => count === 0);
@@ -681,7 +713,10 @@ test("what is said of a crash has the theme that was chosen, not that of the sys
   }
   await page.emulateMedia({ colorScheme: "dark" });
   await until(ground, (now) => now === "rgb(21, 23, 28)");
-  await page.evaluate(() => localStorage.setItem("ape-lab.preferences", JSON.stringify({ theme: "Light" })));
+  await page.evaluate(() => {
+    sessionStorage.clear();
+    localStorage.setItem("ape-lab.preferences", JSON.stringify({ theme: "Light" }));
+  });
   await page.reload();
   await trained(page);
   await breakClock(page, "a panic");
