@@ -47,6 +47,14 @@ fn a_trained_ensemble_evaluates_to_the_figures_it_was_printed_with() {
     assert_eq!((last[0], last[2].parse().ok()), ("19", trained["ensemble"]["capped_return"].as_f64()));
     let again: Value = serde_json::from_slice(&ape(&["train", "--config", files[1]]).stdout).unwrap();
     assert_eq!(again["digest"], trained["digest"]);
+    // Of a run that its configuration alone does not make this is said.
+    let said = |args: &[&str]| String::from_utf8(ape(args).stderr).unwrap();
+    assert_eq!(said(&["train", "--config", files[1]]), "");
+    let mut turned: Value = serde_json::from_str(&std::fs::read_to_string(files[1]).unwrap()).unwrap();
+    turned["moment"] = json!({"update": 19, "turns": [[3, 0.2]]});
+    let other = file("turned.json");
+    std::fs::write(&other, turned.to_string()).unwrap();
+    assert!(said(&["train", "--config", other.to_str().unwrap()]).contains("its β was moved, or its run"));
     // So that it can be told which run a result is of, the digest goes with the files and with what is made of them.
     let file: Value = serde_json::from_str(&std::fs::read_to_string(files[1]).unwrap()).unwrap();
     let attack = ape(&["attack", files[1], "--attackers", "uniform", "--json"]);

@@ -5,7 +5,7 @@ use std::cell::{Cell, RefCell};
 use std::collections::{HashMap, VecDeque};
 use std::rc::Rc;
 
-use ape_lab::ape::{Config, EnsembleFile};
+use ape_lab::ape::{Config, EnsembleFile, Moment};
 use ape_lab::attack::AttackerChoice;
 use ape_lab::experiment::{Bench, Sweep, Task};
 use ape_lab::lab::{Command, Event, Hand, Link, PROTOCOL, Pool, Session, TaskEvent};
@@ -1773,4 +1773,115 @@ fn a_caption_says_what_the_colours_of_a_memory_are() {
     let texts = svg.split("</text>").filter_map(|part| part.rsplit_once('>')).map(|(_, words)| words);
     let words = texts.collect::<Vec<_>>().join(" ").replace('\u{a0}', " ");
     assert!(words.contains("Of a clone that remembers: expected steps within T"), "{words}");
+}
+
+/// A number that has more digits than one would type stays what it is when the focus passes by; one that is typed is taken.
+#[test]
+fn the_focus_changes_no_number() {
+    let desktop = Desktop::default();
+    let link = "v=1&size=4x4&slip=0.999&total_steps=6000&learning_rate=1e-7&beta=0.3333";
+    desktop.visits.borrow_mut().push(link.to_owned());
+    let (mut page, here) = open_with(1280.0, 800.0, desktop);
+    settle(&mut page);
+    let setup = |page: &Page| page.state().as_ref().unwrap().setup().clone();
+    let before = setup(&page);
+    let known = here.0.borrow().commands.len();
+    let mut passed = 0;
+    for tab in ["Train", "World"] {
+        go_to(&mut page, tab);
+        if tab == "Train" {
+            page.get_by_label("Advanced").click_accesskit();
+            page.run_steps(20);
+        }
+        let fields: Vec<_> =
+            page.query_all_by_role(Role::SpinButton).map(|field| field.accesskit_node().label().unwrap()).collect();
+        for name in fields {
+            let field = page.query_all_by_role(Role::SpinButton);
+            let field = { field }.find(|field| field.accesskit_node().label().as_ref() == Some(&name)).unwrap();
+            field.focus();
+            page.run_steps(3);
+            page.key_press(egui::Key::Enter);
+            page.run_steps(3);
+            assert_eq!(setup(&page), before, "{name}");
+            passed += 1;
+        }
+    }
+    assert!(passed >= 12, "{passed}");
+    let commands = here.0.borrow().commands[known..].to_vec();
+    let is_run = |command: &Command| {
+        matches!(command, Command::Load { .. } | Command::Retrain { .. } | Command::Continue { .. })
+    };
+    assert!(!commands.iter().any(is_run), "{commands:?}");
+
+    page.get_by_role_and_label(Role::SpinButton, "Slip").focus();
+    page.run_steps(2);
+    page.event(egui::Event::Text("0.125".to_owned()));
+    page.run_steps(2);
+    page.key_press(egui::Key::Enter);
+    page.run_steps(3);
+    assert_eq!(setup(&page).grid.slip, 0.125);
+    page.get_by_role_and_label(Role::SpinButton, "Slip").focus();
+    page.run_steps(2);
+    page.event(egui::Event::Text("1".to_owned()));
+    page.run_steps(2);
+    page.key_press(egui::Key::Enter);
+    page.run_steps(3);
+    text(&page, "Not done: grid: slip 1.0: must be");
+    assert_eq!(setup(&page).grid.slip, 0.125);
+}
+
+/// An address holds 200 turns of β; with more of them it is of the β that is set now.
+#[test]
+fn a_reload_keeps_a_beta_that_was_moved_often() {
+    let first = Desktop::default();
+    let turns: Vec<String> = (0..200).map(|update| format!("{update}:0.{}", 100 + update)).collect();
+    first.visits.borrow_mut().push(format!("v=1&turns={}", turns.join(";")));
+    let (mut page, _) = open_with(1280.0, 800.0, first.clone());
+    settle(&mut page);
+    page.run_steps(60);
+    assert!(first.address.borrow().contains("turns=0:0.1;"), "{}", first.address.borrow());
+    page.state_mut().as_mut().unwrap().continue_with(0.25);
+    settle(&mut page);
+    page.run_steps(60);
+    let address = first.address.borrow().clone();
+    assert!(address.contains("beta=0.25") && !address.contains("turns"), "{address}");
+    let second = Desktop::default();
+    second.visits.borrow_mut().push(address);
+    let (mut page, _) = open_with(1280.0, 800.0, second);
+    settle(&mut page);
+    assert_eq!(page.state().as_ref().unwrap().setup().last_beta(), 0.25);
+}
+
+/// The configuration alone does not make an ensemble whose β was moved, or whose run was not over: its file says so.
+#[test]
+fn a_saved_ensemble_says_which_moment_it_is_of() {
+    let desktop = Desktop::default();
+    let (mut page, _) = open_with(1280.0, 800.0, desktop.clone());
+    let save = |page: &mut Page| {
+        press(page, "Export and open");
+        page.get_by_label_contains("Ensemble as JSON").click_accesskit();
+        page.run_steps(12);
+        let (name, text) = desktop.saved.borrow_mut().pop().unwrap();
+        assert_eq!(name, "ape-ensemble.json");
+        text
+    };
+    let moment = |text: &str| EnsembleFile::parse(text).unwrap().moment;
+    assert_eq!(moment(&save(&mut page)), None);
+    page.state_mut().as_mut().unwrap().seek(300);
+    until(&mut page, "paused at update 300 of 732");
+    assert_eq!(moment(&save(&mut page)), Some(Moment { update: 300, turns: vec![] }));
+    page.state_mut().as_mut().unwrap().continue_with(0.2);
+    until(&mut page, "trained, update 732 of 732");
+    let turned = save(&mut page);
+    assert_eq!(moment(&turned), Some(Moment { update: 732, turns: vec![(300, 0.2)] }));
+
+    desktop.to_open.borrow_mut().push(("turned.json".to_owned(), Ok(turned.clone())));
+    until(&mut page, "given ensemble");
+    page.run_steps(4);
+    page.state_mut().as_mut().unwrap().export_picture();
+    let svg = desktop.saved.borrow_mut().pop().unwrap().1;
+    assert!(svg.contains("β = 0.6, then 0.2, seed 1,") && svg.contains("update 732."), "{svg}");
+    assert_eq!(moment(&save(&mut page)), moment(&turned));
+    // What no β can be is not believed.
+    assert_eq!(moment(&turned.replace("[300,0.2]", "[300,1e308]")), None);
 }

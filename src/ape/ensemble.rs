@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{Config, Digest, json};
+use super::{Config, ConfigError, Digest, json};
 use crate::mdp::{ACTIONS, Grid, GridError, GridSpec, Policy, PolicyError, Returns, Solver, Value};
 
 /// n experts; one of them, drawn uniformly, acts for a whole episode.
@@ -118,9 +118,28 @@ pub struct EnsembleFile {
     pub config: Option<Config>,
     #[serde(default)]
     pub digest: Option<Digest>,
+    /// Where it is not of the end of the run that `config` alone makes.
+    #[serde(default)]
+    pub moment: Option<Moment>,
     /// Why the `config` that the file has was left out.
     #[serde(skip)]
     pub left_out: Option<String>,
+}
+
+/// A moment of a run whose β was moved, or that is not over, or went on longer than its configuration says.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Moment {
+    /// Updates made.
+    pub update: u32,
+    /// (u, β): from the moment after u updates on, β was this.
+    pub turns: Vec<(u32, f64)>,
+}
+
+impl Moment {
+    /// Whether β was ever what it can be.
+    fn is_possible(&self) -> bool {
+        self.turns.iter().all(|(_, beta)| (0.0..=Config::MAX_BETA).contains(beta))
+    }
 }
 
 /// Why a file holds no ensemble.
@@ -140,6 +159,10 @@ pub enum EnsembleError {
     Grid(#[from] GridError),
     #[error("{0} experts: must be from 1 to {max}", max = Config::MAX_EXPERTS)]
     Experts(usize),
+    #[error("config: {0}")]
+    Config(#[from] ConfigError),
+    #[error("moment: every β must be from 0 to {}", Config::MAX_BETA)]
+    Moment,
     #[error("expert {expert}: {error}")]
     Policy { expert: usize, error: PolicyError },
 }
@@ -155,6 +178,7 @@ impl EnsembleFile {
             experts: ensemble.policies().iter().map(|policy| policy.rows().to_vec()).collect(),
             config,
             digest: None,
+            moment: None,
             left_out: None,
         }
     }
@@ -163,8 +187,8 @@ impl EnsembleFile {
     pub const LONGEST: usize = 10_000_000;
 
     /// Reads the JSON text of a file; [`EnsembleFile::check`] then says whether it makes sense. A `config` that
-    /// is not ours, or not for this grid, is left out: it does not change what the ensemble is. So is a digest that is
-    /// none, without a word.
+    /// is not ours, or not for this grid, is left out: it does not change what the ensemble is. So are a digest and a
+    /// moment that are none, without a word.
     pub fn parse(text: &str) -> Result<EnsembleFile, EnsembleError> {
         if text.len() > Self::LONGEST {
             return Err(EnsembleError::Long);
@@ -174,8 +198,10 @@ impl EnsembleFile {
         };
         let (config, digest) = (fields.remove("config"), fields.remove("digest"));
         let digest = digest.and_then(|digest| json::read("digest", digest).ok());
-        let file =
-            EnsembleFile { digest, ..json::read("", serde_json::Value::Object(fields)).map_err(EnsembleError::Json)? };
+        let moment =
+            fields.remove("moment").and_then(|moment| json::read("moment", moment).ok()).filter(Moment::is_possible);
+        let file: EnsembleFile = json::read("", serde_json::Value::Object(fields)).map_err(EnsembleError::Json)?;
+        let file = EnsembleFile { digest, moment, ..file };
         let config: Result<Config, String> = match config {
             None | Some(serde_json::Value::Null) => return Ok(file),
             Some(config) => json::read("config", config),
@@ -208,6 +234,10 @@ impl EnsembleFile {
         let grid = Grid::new(self.grid)?;
         if self.experts.is_empty() || self.experts.len() > Config::MAX_EXPERTS as usize {
             return Err(EnsembleError::Experts(self.experts.len()));
+        }
+        self.config.as_ref().map_or(Ok(()), Config::check)?;
+        if !self.moment.as_ref().is_none_or(Moment::is_possible) {
+            return Err(EnsembleError::Moment);
         }
         let policy = |(index, rows)| {
             Policy::new(&grid, rows).map_err(|error| EnsembleError::Policy { expert: index + 1, error })

@@ -27,7 +27,7 @@ pub use choice::{Choice, ChoiceError, Model, Parameter};
 pub use config::{AlgorithmKind, BaselineKind, Config, GradientKind, ReturnToGo};
 pub use demonstrate::{Demonstrator, Episode};
 pub use digest::{Digest, DigestError};
-pub use ensemble::{Contexts, Ensemble, EnsembleError, EnsembleFile};
+pub use ensemble::{Contexts, Ensemble, EnsembleError, EnsembleFile, Moment};
 pub use exact_ape::{ExactApe, ExactGradient};
 pub use fields::{ConfigError, FIELDS, Field, Kind, written};
 pub use figures::{Figures, Identity};

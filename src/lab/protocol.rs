@@ -11,7 +11,7 @@ use crate::mdp::{KnownReturns, Policy, Returns};
 
 /// Version of the messages: an old cached worker must not be taken for a new one. [`Event::Ready`] stays the
 /// first variant, so that every version can read every other's.
-pub const PROTOCOL: u32 = 8;
+pub const PROTOCOL: u32 = 9;
 
 /// What is said of a worker with another [`PROTOCOL`].
 pub const OTHER_VERSION: &str = "The worker is of another version than the page: reload the page.";

@@ -7,7 +7,7 @@ use std::ops::RangeInclusive;
 
 use super::recording::{Recording, Search, advance, turn};
 use super::{CloneView, Command, Event, Exported, PolicyView, RunState, Snapshot, Started};
-use crate::ape::{Config, Digest, Ensemble, EnsembleFile, Trainer};
+use crate::ape::{Config, Digest, Ensemble, EnsembleFile, Moment, Trainer};
 use crate::attack::{AttackerChoice, Cloned, FEW_TRIALS, Target, own_clone};
 use crate::experiment::{Course, CurvePoint, Setup};
 use crate::mdp::{Grid, Policy, Returns, Solver, optimal_policy};
@@ -558,8 +558,16 @@ impl Run {
                 (0, self.setup.ensemble.as_ref().and_then(|file| file.config.clone()), self.given_digest())
             }
         };
+        let moment = match &self.subject {
+            Subject::Training(_) => {
+                let turns: Vec<_> = self.setup.course.turns.iter().copied().filter(|(at, _)| *at < update).collect();
+                let is_end = turns.is_empty() && update == self.setup.config.updates();
+                (!is_end).then_some(Moment { update, turns })
+            }
+            Subject::Given { .. } => self.setup.ensemble.as_ref().and_then(|file| file.moment.clone()),
+        };
         let file = EnsembleFile::new(self.subject.grid(), &self.ensemble(), config);
-        Exported { run, update, file: EnsembleFile { digest, ..file } }
+        Exported { run, update, file: EnsembleFile { digest, moment, ..file } }
     }
 
     /// The digest that the file of a given ensemble has.

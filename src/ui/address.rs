@@ -27,6 +27,8 @@ impl App {
     pub(super) fn fragment(&self) -> String {
         let mut setup = self.setup.clone();
         if setup.course.turns.len() > MOST_TURNS {
+            // Too many to tell: a run with the β that is set now, from its start.
+            setup.config.beta = setup.last_beta();
             setup.course.turns.clear();
         }
         let mut pairs = write(&setup);

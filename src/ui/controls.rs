@@ -3,6 +3,7 @@
 use egui::{CollapsingHeader, ComboBox, DragValue, RichText, Ui};
 
 use super::app::App;
+use super::numbers;
 use super::theme::Palette;
 use super::toolbar;
 use super::widgets::{Icon, choose, icon_button, section};
@@ -131,11 +132,7 @@ fn show_field(ui: &mut Ui, field: &Field, explains: bool, config: &mut Config) {
             Kind::Real { low, high, get, set } => {
                 let mut value = get(config);
                 let speed = (value.abs() * 0.01).max(0.0005);
-                let drag = DragValue::new(&mut value)
-                    .range(*low..=*high)
-                    .speed(speed)
-                    .max_decimals(6)
-                    .update_while_editing(false);
+                let drag = numbers::exact(&mut value).range(*low..=*high).speed(speed);
                 if ui.add(drag).accessible_name(field.label).on_hover_text(tip).changed() {
                     set(config, value);
                 }

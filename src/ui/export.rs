@@ -91,9 +91,15 @@ fn origin(shown: &Shown) -> String {
     let preset = PRESETS.iter().find(|preset| (preset.setup)() == *setup);
     let preset = preset.map_or(String::new(), |preset| format!(" (preset “{}”)", preset.title));
     if snapshot.state == RunState::Given {
-        let config = setup.ensemble.as_ref().and_then(|ensemble| ensemble.config.as_ref());
+        let file = setup.ensemble.as_ref();
+        let config = file.and_then(|file| file.config.as_ref());
         let trained = config.map_or(String::new(), |config| {
-            format!(" Its file says: {}, β = {}, seed {}.", method(config), config.beta, config.seed)
+            let moment = file.and_then(|file| file.moment.as_ref());
+            let last_turn = moment.and_then(|moment| moment.turns.last());
+            let turned = last_turn.map_or(String::new(), |(_, beta)| format!(", then {}", numbers::as_set(*beta)));
+            let update = moment.map_or(String::new(), |moment| format!(", update {}", numbers::grouped(moment.update)));
+            let Config { beta, seed, .. } = config;
+            format!(" Its file says: {}, β = {beta}{turned}, seed {seed}{update}.", method(config))
         });
         return format!("A given ensemble of {experts}{preset}.{trained}");
     }

@@ -67,14 +67,13 @@ fn beta(ui: &mut Ui, app: &mut App, width: f32) {
             ui.spacing_mut().interact_size.y = ui.spacing().interact_size.y.max(36.0);
             ui.spacing_mut().slider_rail_height = 8.0;
             let mut beta = app.setup().last_beta();
-            let slider = Slider::new(&mut beta, 0.0..=1.0)
-                .clamping(egui::SliderClamping::Never)
-                .step_by(0.01)
-                .fixed_decimals(2)
-                .update_while_editing(false)
-                .drag_value_speed(0.01);
-            let response = ui.add(slider).accessible_name("β").on_hover_text(Field::named("beta").tip());
-            if response.changed() {
+            let slider =
+                Slider::new(&mut beta, 0.0..=1.0).clamping(egui::SliderClamping::Never).step_by(0.01).show_value(false);
+            let slider = ui.add(slider);
+            let drag = ui.add(numbers::exact(&mut beta).range(0.0..=Config::MAX_BETA).speed(0.01));
+            let is_changed = [slider, drag]
+                .map(|response| response.accessible_name("β").on_hover_text(Field::named("beta").tip()).changed());
+            if is_changed.contains(&true) {
                 app.set_beta(beta.clamp(0.0, Config::MAX_BETA));
             }
         });

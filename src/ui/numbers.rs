@@ -1,5 +1,8 @@
 //! How numbers are written: with a true minus, in steps, in per cent.
 
+use egui::DragValue;
+
+use crate::ape::written;
 use crate::mdp::ReturnKind;
 
 /// A number with so many decimals and a true minus sign.
@@ -13,6 +16,12 @@ pub fn decimal(value: f64, decimals: usize) -> String {
 pub fn times(number: f64, other: f64) -> String {
     let ratio = number / other;
     if ratio.is_finite() { steps(ratio) + "×" } else { "–".to_owned() }
+}
+
+/// A field for a number, written in full: who only passes through it with the keyboard has egui read the text again, and
+/// it must be the same number.
+pub fn exact(value: &mut f64) -> DragValue<'_> {
+    DragValue::new(value).custom_formatter(|value, _| written(value)).update_while_editing(false)
 }
 
 /// Steps or a return, short: one decimal, and powers of ten where it is huge.

@@ -1,9 +1,10 @@
 //! The timeline: every update of the run, to go back to and to go on from.
 
-use egui::{DragValue, Key, RichText, Slider, Ui};
+use egui::{Key, RichText, Slider, Ui};
 
 use super::app::View;
 use super::board::Shown;
+use super::numbers;
 use super::panels::Touched;
 use super::theme::{self, Palette};
 use super::widgets::{Icon, icon_button};
@@ -81,11 +82,7 @@ fn branch(ui: &mut Ui, shown: &Shown, touched: &mut Touched) {
         let drafted = ui.data(|data| data.get_temp::<(u32, f64)>(id)).filter(|(of, _)| *of == run);
         let mut beta = drafted.map_or(shown.snapshot.beta, |(_, beta)| beta);
         ui.label(RichText::new("from here with β").small().color(Palette::of(ui).muted));
-        let drag = DragValue::new(&mut beta)
-            .range(0.0..=Config::MAX_BETA)
-            .speed(0.01)
-            .max_decimals(3)
-            .update_while_editing(false);
+        let drag = numbers::exact(&mut beta).range(0.0..=Config::MAX_BETA).speed(0.01);
         let response = ui.add(drag).accessible_name("β of the branch").on_hover_text(Field::named("beta").tip());
         if response.changed() {
             ui.data_mut(|data| data.insert_temp(id, (run, beta)));

@@ -7,6 +7,7 @@ use egui::{
 
 use super::app::App;
 use super::heatmap;
+use super::numbers;
 use super::panels::{self, Plan};
 use super::theme::{self, GAP, NARROW, Palette};
 use super::widgets::heading;
@@ -111,11 +112,12 @@ impl WorldTab {
             ui.spacing_mut().slider_width = 90.0;
             let slip = Slider::new(&mut grid.slip, 0.0..=0.9)
                 .step_by(0.05)
-                .fixed_decimals(2)
-                .clamping(egui::SliderClamping::Edits)
-                .update_while_editing(false);
+                .clamping(egui::SliderClamping::Never)
+                .show_value(false);
             let tip = "ε: with this probability the move that is made is drawn from all five instead (paper: 0)";
             ui.add(slip).accessible_name("Slip").on_hover_text(tip);
+            let drag = numbers::exact(&mut grid.slip).range(0.0..=1.0).speed(0.01);
+            ui.add(drag).accessible_name("Slip").on_hover_text(tip);
             ui.label(RichText::new("slip").small().color(Palette::of(ui).muted));
             if is_narrow {
                 ui.end_row();

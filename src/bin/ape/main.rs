@@ -257,7 +257,13 @@ fn start(matches: &ArgMatches) -> Result<Setup, String> {
     match (text("preset"), text("config")) {
         (Some(_), Some(_)) => Err("--preset and --config: give one of them, both say where to start".to_owned()),
         (None, Some(file)) => {
-            Setup::parse(&read(file, EnsembleFile::LONGEST)?).map_err(|error| format!("{file}: {error}"))
+            let text = read(file, EnsembleFile::LONGEST)?;
+            if EnsembleFile::parse(&text).is_ok_and(|file| file.moment.is_some()) {
+                mutter!(
+                    "ape: {file}: its β was moved, or its run cut short or made longer; what its config says is trained\n"
+                );
+            }
+            Setup::parse(&text).map_err(|error| format!("{file}: {error}"))
         }
         (Some(name), None) => {
             let known = || PRESETS.iter().map(|preset| preset.name).collect::<Vec<_>>().join(", ");
