@@ -498,6 +498,7 @@ fn bad_shards_get_one_sentence_and_are_left_alone() {
     for (bytes, expected) in [
         (whole.as_bytes()[..whole.len() / 2].to_vec(), "not a shard of a sweep: EOF"),
         (Vec::new(), "not a shard of a sweep: EOF"),
+        (format!("{{\"runs\":[{}0]}}", "0,".repeat(4_000_001)).into_bytes(), "more than 4000000 values"),
         (vec![0xff, 0xfe], "a text in UTF-8"),
         (b"[".repeat(100_000), "not a shard of a sweep: "),
         (replace("\"success\":", "\"success\":NaN,\"s\":"), "not a shard of a sweep: expected value"),

@@ -107,6 +107,7 @@ struct Desktop {
     visits: Rc<RefCell<Vec<String>>>,
     address: Rc<RefCell<String>>,
     kept: Rc<RefCell<HashMap<String, String>>>,
+    kept_elsewhere: Rc<RefCell<HashMap<String, String>>>,
     tasks_fail: Rc<Cell<bool>>,
     has_no_clipboard: Rc<Cell<bool>>,
 }
@@ -156,6 +157,10 @@ impl Host for Desktop {
 
     fn kept(&self, name: &str) -> Option<String> {
         self.kept.borrow().get(name).cloned()
+    }
+
+    fn kept_elsewhere(&self, name: &str) -> Option<String> {
+        self.kept_elsewhere.borrow().get(name).cloned()
     }
 }
 
@@ -494,6 +499,46 @@ fn a_run_continued_with_its_own_beta_is_the_same_run() {
         let address = desktop.address.borrow();
         assert!(!address.contains("turns") && !address.contains("updates") && address.contains("digest"), "{address}");
     }
+}
+
+/// Who continues with the β of a moment that lies before a turn leaves the turn out.
+#[test]
+fn a_run_continued_with_its_own_beta_turns_no_more() {
+    let desktop = Desktop::default();
+    desktop.visits.borrow_mut().push("v=1".to_owned());
+    let (mut page, _here) = open_with(1280.0, 800.0, desktop.clone());
+    settle(&mut page);
+    let plain = page.state().as_ref().unwrap().shown().unwrap().1.digest;
+    desktop.visits.borrow_mut().push("v=1&turns=300:0.2".to_owned());
+    page.run_steps(3);
+    settle(&mut page);
+    page.state_mut().as_mut().unwrap().seek(100);
+    until(&mut page, "paused at update 100 of 732");
+    page.state_mut().as_mut().unwrap().continue_with(0.6);
+    until(&mut page, "trained, update 732 of 732");
+    page.run_steps(60);
+    let app = page.state().as_ref().unwrap();
+    let (_, snapshot) = app.shown().unwrap();
+    assert!(app.shows_controls());
+    assert_eq!((snapshot.beta, snapshot.course.turns.clone(), snapshot.digest), (0.6, vec![(100, 0.6)], plain));
+}
+
+/// The moment that is searched for comes before the β that it is continued with, in the address and with another worker, too.
+#[test]
+fn a_beta_continued_with_belongs_to_the_moment_that_is_sought() {
+    let (mut page, here) = open(1280.0, 800.0);
+    here.0.borrow_mut().hangs = true;
+    page.state_mut().as_mut().unwrap().seek(300);
+    page.state_mut().as_mut().unwrap().continue_with(0.3);
+    let setup = page.state().as_ref().unwrap().setup().clone();
+    assert_eq!((setup.course.turns.clone(), setup.updates()), (vec![(300, 0.3)], 732));
+    here.0.borrow_mut().events = VecDeque::from([Err("The worker has stopped.".to_owned())]);
+    here.0.borrow_mut().hangs = false;
+    page.run_steps(6);
+    until(&mut page, "trained, update 732 of 732");
+    let app = page.state().as_ref().unwrap();
+    assert!(app.shows_controls());
+    assert_eq!(app.shown().unwrap().1.course.turns, [(300, 0.3)]);
 }
 
 /// A key that is held down asks a slow worker for no more than a few updates.
@@ -1710,7 +1755,7 @@ fn a_link_to_a_file_is_not_shown_with_another_of_its_name() {
     let mut other = trap.clone();
     other.experts.truncate(1);
     let [trap, other] = [trap, other].map(|file| serde_json::to_string(&file).unwrap());
-    desktop.to_open.borrow_mut().push(("mine.json".to_owned(), Ok(trap)));
+    desktop.to_open.borrow_mut().push(("mine.json".to_owned(), Ok(trap.clone())));
     page.run_steps(2);
     settle(&mut page);
     page.run_steps(40);
@@ -1719,10 +1764,20 @@ fn a_link_to_a_file_is_not_shown_with_another_of_its_name() {
     desktop.to_open.borrow_mut().push(("mine.json".to_owned(), Ok(other)));
     page.run_steps(2);
     settle(&mut page);
-    desktop.visits.borrow_mut().push(address);
+    desktop.visits.borrow_mut().push(address.clone());
     page.run_steps(2);
     text(&page, "This link shows the ensemble of mine.json, which is not in the link");
     assert_eq!(page.state().as_ref().unwrap().preset(), Some(0));
+    // Another tab has it.
+    desktop.kept_elsewhere.borrow_mut().insert("ensemble".to_owned(), format!("mine.json\n{trap}"));
+    desktop.visits.borrow_mut().push("v=1".to_owned());
+    page.run_steps(2);
+    settle(&mut page);
+    desktop.visits.borrow_mut().push(address);
+    page.run_steps(2);
+    settle(&mut page);
+    let experts = page.state().as_ref().unwrap().setup().ensemble.as_ref().map(|file| file.experts.len());
+    assert_eq!(experts, Some(2));
 }
 
 /// Who cannot be given the link is told where it stands.

@@ -19,6 +19,11 @@ impl Course {
     /// Most turns of a run: nobody moves a slider as often.
     pub const MOST_TURNS: usize = 10_000;
 
+    /// Whether β is not turned any more after `update` updates.
+    pub fn is_settled(&self, update: u32) -> bool {
+        self.turns.last().is_none_or(|(last, _)| *last <= update)
+    }
+
     /// From the moment after `update` updates on β is `beta`; what was to come later is forgotten.
     pub fn turn(&mut self, update: u32, beta: f64) {
         self.turns.retain(|(earlier, _)| *earlier < update);

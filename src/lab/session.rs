@@ -279,7 +279,8 @@ impl Session {
         let runs = self.runs;
         let run = self.unfinished()?;
         let update = run.trainer().updates();
-        if run.trainer().config().beta == beta {
+        let is_settled = run.setup.course.is_settled(update);
+        if run.trainer().config().beta == beta && is_settled {
             // What is to come has been, or comes as it would have.
             run.go_on();
             return Ok(());

@@ -133,11 +133,13 @@ impl App {
         match self.read_address(fragment) {
             Ok(None) => {}
             Ok(Some((name, sum))) => {
-                let kept = self.host.kept(FILE);
-                let text = kept.as_deref().and_then(|kept| kept.strip_prefix(&format!("{name}\n")));
                 // Another file may have the same name.
-                let text = text.filter(|text| sum.is_none_or(|sum| Opened::new(name.clone(), text).sum == sum));
-                match text.map(str::to_owned) {
+                let is_meant = |text: &&str| sum.is_none_or(|sum| Opened::new(name.clone(), text).sum == sum);
+                let text = [self.host.kept(FILE), self.host.kept_elsewhere(FILE)]
+                    .into_iter()
+                    .flatten()
+                    .find_map(|kept| kept.strip_prefix(&format!("{name}\n")).filter(is_meant).map(str::to_owned));
+                match text {
                     Some(text) => {
                         let clones = self.view.clones.clone();
                         self.open(name, Ok(text));

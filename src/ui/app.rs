@@ -505,9 +505,11 @@ impl App {
     /// The run goes on from the moment shown with this β; where that lies back, on a branch.
     pub fn continue_with(&mut self, beta: f64) {
         if let Some(shown) = &self.shown {
-            let update = shown.snapshot.update;
+            // A moment that is searched for comes first.
+            let update = self.moment();
             let is_here = self.view.sought.is_none() && !self.is_retraining() && self.continued.is_none();
-            if is_here && shown.snapshot.beta == beta && self.shows_controls() {
+            let is_same = shown.snapshot.beta == beta && self.setup.course.is_settled(update);
+            if is_here && is_same && self.shows_controls() {
                 // No turn, no branch: what is to come has been, or comes as it would have.
                 (self.preset, self.promise) = (None, None);
                 return self.send(Command::Continue { beta });

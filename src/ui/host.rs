@@ -55,6 +55,11 @@ pub trait Host {
         None
     }
 
+    /// The same by whichever tab was the last to keep it.
+    fn kept_elsewhere(&self, _name: &str) -> Option<String> {
+        None
+    }
+
     /// A fault and what helps to find it, as a text to hand on.
     fn report(&self, fault: &str) -> String {
         format!("ape-lab {}\n{fault}", env!("CARGO_PKG_VERSION"))

@@ -126,6 +126,10 @@ impl Host for Files {
         own_storage().and_then(kept).or_else(|| storage().and_then(kept))
     }
 
+    fn kept_elsewhere(&self, name: &str) -> Option<String> {
+        storage()?.get_item(&key(name)).ok()?
+    }
+
     fn now(&self) -> Option<f64> {
         Some(web_sys::window()?.performance()?.now() / 1000.0)
     }

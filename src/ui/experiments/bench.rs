@@ -54,7 +54,7 @@ impl BenchTab {
             (snapshot.run, snapshot.update, started.setup.config.horizon) == (exported.run, exported.update, horizon)
         });
         let computed = || ensemble_returns(&grid, &ensemble, horizon);
-        let ensemble = known.map_or_else(computed, |(_, snapshot)| snapshot.ensemble.clone());
+        let ensemble = known.map_or_else(computed, |(_, snapshot)| snapshot.ensemble);
         self.subject = Some(Subject { title, horizon, seed, digest, ensemble });
         // What it came from does not matter to whoever attacks it.
         let file = Box::new(EnsembleFile { config: None, ..exported.file });
