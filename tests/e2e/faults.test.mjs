@@ -574,19 +574,54 @@ test("on a screen of 320 × 480 and with little memory nothing overlaps", async 
   await small.close();
 });
 
+/** Lets the memory be seen that the programs of page and worker have, as `testMemory`. */
+async function weighed(page) {
+  const look = `const { instantiateStreaming } = WebAssembly;
+    WebAssembly.instantiateStreaming = async (...parts) => {
+      const made = await instantiateStreaming.apply(WebAssembly, parts);
+      self.testMemory = made.instance.exports.memory;
+      return made;
+    };`;
+  await page.addInitScript(look);
+  await page.route("**/worker_loader.js", async (route) => {
+    const loader = await readFile(join(DIST, "worker_loader.js"), "utf8");
+    await route.fulfill({ contentType: "text/javascript", body: look + loader });
+  });
+}
+
+test("who plays on and on takes no more memory", async () => {
+  const { page, problems, close } = await open(browser, site.address + "#v=1&speed=max", { before: weighed });
+  await trained(page);
+  await page.locator("#canvas").focus();
+  const debug = await page.context().newCDPSession(page);
+  const memory = async () => {
+    await debug.send("HeapProfiler.collectGarbage");
+    const { usedSize } = await debug.send("Runtime.getHeapUsage");
+    const bytes = () => self.testMemory.buffer.byteLength;
+    return { page: await page.evaluate(bytes), scripts: usedSize, worker: await page.workers()[0].evaluate(bytes) };
+  };
+  // β, playing and going back, the timeline, the tabs.
+  const keys = ["ArrowUp", "ArrowUp", "ArrowDown", "r", "Space", "Shift+ArrowLeft", "ArrowLeft", "End", "1", "2", "3", "4", "5", "6", "7", "2", "ArrowDown"];
+  const play = async (rounds) => {
+    for (let round = 0; round < rounds; round++) for (const key of keys) await press(page, key);
+  };
+  await play(10);
+  const before = await memory();
+  await play(20);
+  const after = await memory();
+  console.log(`after 10 rounds ${JSON.stringify(before)}, after 30 ${JSON.stringify(after)}`);
+  // A single picture of the run kept in each round would be more.
+  for (const part of ["page", "scripts", "worker"]) {
+    assert.ok(after[part] <= before[part] + 400_000, `${part}: ${before[part]} ${after[part]}`);
+  }
+  assert.deepEqual(problems, []);
+  await close();
+});
+
 test("of a thousand quick moves of β the last one counts, and nothing piles up", async () => {
   const before = async (page) => {
     await watched(page);
-    await page.route("**/worker_loader.js", async (route) => {
-      const look = `const { instantiateStreaming } = WebAssembly;
-        WebAssembly.instantiateStreaming = async (...parts) => {
-          const made = await instantiateStreaming.apply(WebAssembly, parts);
-          self.testMemory = made.instance.exports.memory;
-          return made;
-        };`;
-      const loader = await readFile(join(DIST, "worker_loader.js"), "utf8");
-      await route.fulfill({ contentType: "text/javascript", body: look + loader });
-    });
+    await weighed(page);
   };
   const { page, problems, close } = await open(browser, site.address + "#v=1&speed=max", { before });
   await trained(page);
