@@ -144,7 +144,7 @@ impl Player for EnsemblePlayer {
 
 /// The clone: the expert is drawn anew at each step. Of `ENDS` + 1 experts at most.
 pub struct ClonePlayer<const ENDS: usize> {
-    /// `[S][n]`, the same for all n.
+    /// `[S][n]`; only the first of a state's is looked at.
     pub contexts: Vec<Draw<ENDS>>,
 }
 

@@ -257,7 +257,9 @@ const MOST_ENDS: usize = Config::MAX_EXPERTS as usize - 1;
 
 /// The clone by p(c|s).
 fn blind<const ENDS: usize>(contexts: &Contexts) -> ClonePlayer<ENDS> {
-    ClonePlayer { contexts: contexts.rows().flat_map(|p| std::iter::repeat_n(Draw::new(p), p.len())).collect() }
+    let mut draws = vec![Draw::new(&[]); contexts.as_slice().len()];
+    draws.iter_mut().step_by(contexts.row(0).len()).zip(contexts.rows()).for_each(|(draw, p)| *draw = Draw::new(p));
+    ClonePlayer { contexts: draws }
 }
 
 /// The clone by p(c|τ).

@@ -16,7 +16,8 @@ pub struct Draw<const ENDS: usize> {
 /// The draw of an action: the same with all four ends compared at once.
 #[derive(Clone, Copy, Debug)]
 pub struct ActionDraw {
-    ends: i32x4,
+    /// The last number of each action's interval, where [`Draw`] has the first of the next.
+    lasts: i32x4,
 }
 
 impl ActionDraw {
@@ -25,14 +26,13 @@ impl ActionDraw {
 
     /// `probabilities`: at most five of them, with sum 1.
     pub fn new(probabilities: &[f64]) -> Self {
-        ActionDraw { ends: i32x4::new(Draw::new(probabilities).ends) }
+        ActionDraw { lasts: i32x4::new(Draw::new(probabilities).ends.map(|end| end - 1)) }
     }
 
     /// The set of actions before that which 32 uniform bits stand for, bit a for action a.
     #[inline]
     pub fn passed(&self, bits: u32) -> usize {
-        let above = i32x4::splat((bits >> 2) as i32 + 1);
-        above.simd_gt(self.ends).to_bitmask() as usize % Self::SETS
+        i32x4::splat((bits >> 2) as i32).simd_gt(self.lasts).to_bitmask() as usize % Self::SETS
     }
 
     /// The action that comes after such a set.

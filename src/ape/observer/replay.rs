@@ -24,15 +24,21 @@ struct Replay {
     kept: usize,
     /// `[S][kept]`: the contexts, each cell's a ring.
     rings: Vec<u8>,
-    /// `[S]`: contexts ever left at a cell; its ring's next place is this modulo `kept`.
-    seen: Vec<u64>,
+    /// `[S]`: the next place of a cell's ring, and how many of its places are taken.
+    places: Vec<(u32, u32)>,
     /// `[S][n]`: how often each context is in a cell's ring.
     counts: Vec<u32>,
 }
 
 impl Replay {
     fn new(cells: usize, experts: usize, kept: usize) -> Self {
-        Replay { experts, kept, rings: vec![0; cells * kept], seen: vec![0; cells], counts: vec![0; cells * experts] }
+        Replay {
+            experts,
+            kept,
+            rings: vec![0; cells * kept],
+            places: vec![(0, 0); cells],
+            counts: vec![0; cells * experts],
+        }
     }
 }
 
@@ -42,20 +48,23 @@ impl Observer for Replay {
     }
 
     fn bytes(&self) -> usize {
-        self.rings.len() + 8 * self.seen.len() + 4 * self.counts.len()
+        self.rings.len() + 8 * self.places.len() + 4 * self.counts.len()
     }
 
     fn saw(&mut self, context: usize, states: &[u32]) {
         for &state in states {
             let state = state as usize;
-            let place = &mut self.rings[state * self.kept + (self.seen[state] % self.kept as u64) as usize];
+            let (next, taken) = &mut self.places[state];
+            let kept = &mut self.rings[state * self.kept + *next as usize];
             let counts = &mut self.counts[state * self.experts..][..self.experts];
-            if self.seen[state] >= self.kept as u64 {
-                counts[*place as usize] -= 1;
+            if *taken == self.kept as u32 {
+                counts[*kept as usize] -= 1;
+            } else {
+                *taken += 1;
             }
-            *place = context as u8;
+            *kept = context as u8;
             counts[context] += 1;
-            self.seen[state] += 1;
+            *next = if *next + 1 == self.kept as u32 { 0 } else { *next + 1 };
         }
     }
 
