@@ -40,8 +40,13 @@ fn target(file: &Path) -> io::Result<PathBuf> {
     }
     match file.canonicalize() {
         Ok(target) if target.is_dir() => Err(io::Error::other("is a folder, expected a file")),
+        Ok(target) if is_output(&target) => Err(io::Error::other("is what is printed to, expected another file")),
         Ok(target) => Ok(target),
         Err(error) if error.kind() == io::ErrorKind::NotFound => {
+            // A link to what is not there yet. (Links that lead back to themselves are another error.)
+            if let Ok(linked) = file.read_link() {
+                return target(&folder(file).join(linked));
+            }
             let folder = folder(file);
             if folder.is_dir() {
                 Ok(file.to_owned())
@@ -51,6 +56,21 @@ fn target(file: &Path) -> io::Result<PathBuf> {
         }
         Err(error) => Err(error),
     }
+}
+
+/// Whether it is the file that the program prints to: the one would write over the other.
+#[cfg(unix)]
+fn is_output(target: &Path) -> bool {
+    use std::os::fd::AsFd;
+    use std::os::unix::fs::MetadataExt;
+    let output = io::stdout().as_fd().try_clone_to_owned().and_then(|output| File::from(output).metadata());
+    let is_same = |(a, b): (std::fs::Metadata, std::fs::Metadata)| (a.dev(), a.ino()) == (b.dev(), b.ino());
+    target.is_file() && output.ok().zip(target.metadata().ok()).is_some_and(is_same)
+}
+
+#[cfg(not(unix))]
+fn is_output(_target: &Path) -> bool {
+    false
 }
 
 fn is_device(target: &Path) -> bool {
@@ -68,5 +88,11 @@ fn part(target: &Path) -> io::Result<NamedTempFile> {
     // As any new file, not for its owner alone.
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    builder.tempfile_in(folder(target))
+    let part = builder.tempfile_in(folder(target))?;
+    // Or as the one whose place it takes.
+    #[cfg(unix)]
+    if let Ok(before) = target.metadata() {
+        part.as_file().set_permissions(before.permissions())?;
+    }
+    Ok(part)
 }
