@@ -130,7 +130,9 @@ fn presets_are_listed() {
 fn bad_flags_get_one_sentence() {
     assert!(complaint(&["train", "--beta", "5"]).contains("--beta 5: must be a number from 0 to 2"));
     assert!(
-        complaint(&["train", "--observer", "me"]).contains("one of uniform, occupancy, replay(60), history, gru(4)")
+        complaint(&["train", "--observer", "replay(2000)"]).contains(
+            "one of uniform; occupancy; replay(contexts kept at each cell), 1 to 1000; history; gru(recurrent units), 1 to 32"
+        )
     );
     assert!(
         complaint(&["train", "--preset", "none"]).contains("blind, paper, exact, price, lure, no-protection, trap")
@@ -268,7 +270,7 @@ fn results_go_where_they_can_be_written() {
 #[cfg(unix)]
 #[test]
 fn links_and_pipes_stay_what_they_are() {
-    use std::os::unix::fs::FileTypeExt;
+    use std::os::unix::fs::{FileTypeExt, PermissionsExt};
     let folder = file("links");
     let _ = std::fs::remove_dir_all(&folder);
     std::fs::create_dir_all(&folder).unwrap();
@@ -286,6 +288,35 @@ fn links_and_pipes_stay_what_they_are() {
         listener.join().unwrap()
     });
     assert!(heard == model && pipe.metadata().unwrap().file_type().is_fifo());
+    // A link to what is not there yet leads there all the same.
+    let (dangling, new) = (folder.join("dangling.json"), folder.join("new.json"));
+    std::os::unix::fs::symlink("new.json", &dangling).unwrap();
+    assert!(grid(&dangling) && dangling.is_symlink());
+    assert_eq!(std::fs::read_to_string(&new).unwrap(), model);
+    // Who could not read the old file cannot read the new one.
+    std::fs::set_permissions(&new, std::fs::Permissions::from_mode(0o600)).unwrap();
+    assert!(grid(&new));
+    assert_eq!(new.metadata().unwrap().permissions().mode() & 0o777, 0o600);
+}
+
+/// The figures that are printed and the file would write over each other.
+#[cfg(target_os = "linux")]
+#[test]
+fn what_is_printed_to_is_no_output() {
+    let path = file("printed.json");
+    let command = |arguments: &[&str]| {
+        let printed = std::fs::File::create(&path).unwrap();
+        let output = Command::new(env!("CARGO_BIN_EXE_ape")).args(arguments).stdout(printed).output().unwrap();
+        (output.status.code(), String::from_utf8(output.stderr).unwrap())
+    };
+    for out in ["/dev/stdout", path.to_str().unwrap()] {
+        let (code, line) = command(&["train", "--total-steps", "4096", "--out", out]);
+        assert_eq!(
+            (code, line.trim_end()),
+            (Some(2), &*format!("ape: --out {out}: is what is printed to, expected another file"))
+        );
+        assert!(path.metadata().unwrap().len() == 0);
+    }
 }
 
 /// Half a result is no success, and help that nobody reads is no crash.
@@ -611,7 +642,7 @@ fn outputs_are_checked_before_the_work() {
     let folder = file("outputs");
     std::fs::create_dir_all(folder.join("inner")).unwrap();
     let [one, other] = ["inner/../same", "same"].map(|name| folder.join(name).to_str().unwrap().to_owned());
-    let line = complaint(&["train", "--total-steps", "4000000000", "--out", &one, "--curve", &other]);
+    let line = complaint(&["train", "--total-steps", "1000000000", "--out", &one, "--curve", &other]);
     assert!(line.contains("which is another file of this command"), "{line}");
     std::fs::create_dir_all(folder.join("docs/RESULTS.md")).unwrap();
     let line = complaint(&["results", folder.join("docs").to_str().unwrap()]);

@@ -67,6 +67,11 @@ pub trait Algorithm: Send {
     /// p(c|s) of the run's observer as it stands; of one with a memory, at the start of an episode.
     fn contexts(&mut self) -> Contexts;
 
+    /// β of the coming update.
+    fn beta(&self) -> f64 {
+        self.experts().config.beta
+    }
+
     /// What the run's observer makes of the clone's own episode, where it has a memory.
     fn memory(&self) -> Option<Box<dyn Memory>> {
         None
@@ -133,6 +138,11 @@ impl Trainer {
         Config { beta, ..self.config().clone() }.check()?;
         self.algorithm.experts_mut().config.beta = beta;
         Ok(())
+    }
+
+    /// β of the coming update: where exact APE is still on its way to the one that is set, that of its place on the way.
+    pub fn beta(&self) -> f64 {
+        self.algorithm.beta()
     }
 
     /// The experts as they are now.

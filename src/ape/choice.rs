@@ -65,6 +65,15 @@ impl<M: Model> Choice<M> {
         M::table().iter().enumerate().map(move |(index, model)| Self::at(index as u32, default(model)))
     }
 
+    /// Every model as it is written, with the range of its number.
+    pub fn known() -> String {
+        let known = M::table().iter().map(|model| match model.parameter() {
+            Some(p) => format!("{}({}), {} to {}", model.name(), p.meaning, p.low, p.high),
+            None => model.name().to_owned(),
+        });
+        known.collect::<Vec<_>>().join("; ")
+    }
+
     pub fn model(&self) -> &'static M {
         &M::table()[self.index as usize]
     }
@@ -132,16 +141,10 @@ impl<M: Model> FromStr for Choice<M> {
                 }
             }
         };
-        parse().ok_or_else(|| {
-            let known = M::table().iter().map(|model| match model.parameter() {
-                Some(p) => format!("{}({}), {} to {}", model.name(), p.meaning, p.low, p.high),
-                None => model.name().to_owned(),
-            });
-            ChoiceError {
-                what: M::WHAT,
-                text: text.chars().take(40).collect(),
-                known: known.collect::<Vec<_>>().join("; "),
-            }
+        parse().ok_or_else(|| ChoiceError {
+            what: M::WHAT,
+            text: text.chars().take(40).collect(),
+            known: Self::known(),
         })
     }
 }

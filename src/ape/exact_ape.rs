@@ -56,7 +56,7 @@ impl ExactApe {
     fn gradient_of(&mut self, ensemble: &Ensemble) -> ExactGradient {
         let task = (&*self.experts.grid, self.experts.config.horizon);
         let (n, cells) = (ensemble.experts(), self.experts.grid.cells());
-        let beta = self.beta_now();
+        let beta = self.beta();
         let share = 1.0 / n as f64;
         let mut by_policy = vec![[0.0; ACTIONS]; n * cells];
         let mut visits = Vec::with_capacity((n + 1) * cells);
@@ -104,19 +104,6 @@ impl ExactApe {
         }
         ExactGradient { objective: own - beta * denied, ensemble_return: own, logits, visits }
     }
-
-    /// β of the coming update. For a small β the experts that agree are a local optimum which gradients do not
-    /// leave, while experts that were parted under a large β stay parted under a small one, at a better J. A
-    /// very large one, from the start, makes an expert give up. So a run starts at [`Self::PARTING_BETA`] and comes to
-    /// its own β over its first half.
-    fn beta_now(&self) -> f64 {
-        let Config { beta, alpha, exact_updates, .. } = self.experts.config;
-        if beta == 0.0 || alpha.is_some() {
-            return beta;
-        }
-        let done = f64::from(self.experts.updates) / f64::from(exact_updates);
-        beta + (Self::PARTING_BETA - beta) * (1.0 - 2.0 * done).max(0.0)
-    }
 }
 
 /// J and its exact derivative.
@@ -156,6 +143,19 @@ impl Algorithm for ExactApe {
             self.experts.config.horizon,
             0,
         )
+    }
+
+    /// β of the coming update. For a small β the experts that agree are a local optimum which gradients do not
+    /// leave, while experts that were parted under a large β stay parted under a small one, at a better J. A
+    /// very large one, from the start, makes an expert give up. So a run starts at [`Self::PARTING_BETA`] and comes to
+    /// its own β over its first half.
+    fn beta(&self) -> f64 {
+        let Config { beta, alpha, exact_updates, .. } = self.experts.config;
+        if beta == 0.0 || alpha.is_some() {
+            return beta;
+        }
+        let done = f64::from(self.experts.updates) / f64::from(exact_updates);
+        beta + (Self::PARTING_BETA - beta) * (1.0 - 2.0 * done).max(0.0)
     }
 
     fn update(&mut self) -> f64 {

@@ -2,7 +2,7 @@
 //!
 //! Checking, the command line's flags and the page's controls all read it.
 
-use super::observer::{OBSERVERS, ObserverChoice};
+use super::observer::ObserverChoice;
 use super::{AdversaryReward, AlgorithmKind, BaselineKind, Config, GradientKind, ReturnToGo};
 
 /// One field of [`Config`].
@@ -34,6 +34,8 @@ pub enum Kind {
     /// A word; `options` are those to choose from.
     Word {
         options: fn() -> Vec<String>,
+        /// What can be written, in words.
+        known: fn() -> String,
         get: fn(&Config) -> String,
         set: fn(&mut Config, &str) -> bool,
     },
@@ -72,7 +74,7 @@ impl Field {
         match &self.kind {
             Kind::Real { low, high, .. } => format!("a number from {low} to {high}"),
             Kind::Whole { low, high, .. } => format!("a whole number from {low} to {high}"),
-            Kind::Word { options, .. } => format!("one of {}", options().join(", ")),
+            Kind::Word { known, .. } => format!("one of {}", known()),
             Kind::Text { expected, .. } => (*expected).to_owned(),
         }
     }
@@ -142,6 +144,7 @@ macro_rules! word {
     ($field:ident, $($text:literal => $value:expr),+) => {
         Kind::Word {
             options: || vec![$($text.to_owned()),+],
+            known: || [$($text),+].join(", "),
             get: |config| match config.$field { $(value if value == $value => $text.to_owned(),)+ _ => unreachable!("every value has a word") },
             set: |config, text| match text { $($text => { config.$field = $value; true })+ _ => false },
         }
@@ -183,7 +186,8 @@ pub static FIELDS: [Field; 19] = [
         paper: Some("replay(60)"),
         help: "Who the experts take the cloner to be: how it guesses which expert acted at a cell, p(c|s) (Eq. 1).",
         kind: Kind::Word {
-            options: || OBSERVERS.iter().zip(ObserverChoice::all()).map(|(_, choice)| choice.to_string()).collect(),
+            options: || ObserverChoice::all().map(|choice| choice.to_string()).collect(),
+            known: ObserverChoice::known,
             get: |config| config.observer.to_string(),
             set: |config, text| text.parse().map(|observer| config.observer = observer).is_ok(),
         },
@@ -263,7 +267,7 @@ pub static FIELDS: [Field; 19] = [
         label: "Run (ensemble steps)",
         paper: Some("3000000"),
         help: "Length of a run in ensemble steps: divided by the batch it gives the number of updates, 732 in the paper.",
-        kind: whole!(total_steps, 1, u32::MAX),
+        kind: whole!(total_steps, 1, 1_000_000_000),
     },
     Field {
         name: "exact_updates",

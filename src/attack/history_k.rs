@@ -39,7 +39,7 @@ struct Window {
     moves: Vec<(f64, Option<usize>)>,
 }
 
-fn clone(target: &Target, k: u32, _: &mut Progress) -> Option<Cloned> {
+fn clone(target: &Target, k: u32, progress: &mut Progress) -> Option<Cloned> {
     let (grid, policies, k) = (target.grid, target.ensemble.policies(), k as usize);
     let n = policies.len();
     // P_c(s → s') and how often a window of full length begins at s.
@@ -96,7 +96,10 @@ fn clone(target: &Target, k: u32, _: &mut Progress) -> Option<Cloned> {
     let mut next = under_way.clone();
     let starts = grid.starts().len();
     let mut steps = vec![0.0; starts];
-    for _ in 0..target.horizon {
+    for step in 0..target.horizon {
+        if step.is_multiple_of(16) && !progress(f64::from(step) / f64::from(target.horizon)) {
+            return None;
+        }
         for (steps, under_way) in steps.iter_mut().zip(&under_way) {
             *steps += under_way;
         }

@@ -10,6 +10,7 @@ use crate::mdp::{ACTIONS, Grid, KnownReturns, Policy, RETURN_KINDS, Returns, Sol
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CurvePoint {
     pub update: u32,
+    /// Of the coming update.
     pub beta: f64,
     pub ensemble: Returns,
     /// Of the clone by the run's own observer.
@@ -45,7 +46,7 @@ impl CurvePoint {
         });
         CurvePoint {
             update: trainer.updates(),
-            beta: config.beta,
+            beta: trainer.beta(),
             ensemble: Returns::mean(&ensemble.returns(&mut solver, config.horizon)),
             clone: own.returns,
             denied,

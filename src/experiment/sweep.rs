@@ -63,8 +63,9 @@ pub struct Sweep {
 pub struct SweepPoint {
     pub beta: f64,
     pub ensemble: Summary,
-    pub clone: Summary,
-    pub occupancy: Summary,
+    /// None where the return is not known of the clone.
+    pub clone: Option<Summary>,
+    pub occupancy: Option<Summary>,
 }
 
 impl Sweep {
@@ -135,8 +136,7 @@ impl Sweep {
         }
     }
 
-    /// One point for each β, for one kind of return (its place in [`RETURN_KINDS`]); a β is left out where the return
-    /// is not known of the clone.
+    /// One point for each β, for one kind of return (its place in [`RETURN_KINDS`]).
     pub fn points(&self, kind: usize) -> Vec<SweepPoint> {
         let point = |runs: &[SweepRun]| {
             let runs = || runs.iter();
@@ -146,8 +146,8 @@ impl Sweep {
             Some(SweepPoint {
                 beta: runs().next()?.beta,
                 ensemble: Summary::of(&own)?,
-                clone: Summary::of(&clone?)?,
-                occupancy: Summary::of(&occupancy?)?,
+                clone: clone.and_then(|clone| Summary::of(&clone)),
+                occupancy: occupancy.and_then(|occupancy| Summary::of(&occupancy)),
             })
         };
         // All seeds of a β stand together.

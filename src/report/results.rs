@@ -66,7 +66,7 @@ pub fn results(run: Run) -> Result<Vec<(String, String)>, String> {
         "# Results\n\n\
          Written by `cargo xtask results`, never by hand: every number below comes from a run of this repository's code, which \
          took {:.0} s on {} cores. What is computed and how the paper was read stands in [METHOD.md](METHOD.md). Returns are in \
-         steps, exact unless an interval says that they were simulated; a run is one seed from 1 on; ± is the standard \
+         steps and exact, but for those of a clone by `gru`, which are simulated throughout; a run is one seed from 1 on; ± is the standard \
          deviation over seeds, brackets hold the 95 % percentile bootstrap interval of the mean, which is too narrow for so few (METHOD.md says how much). The paper is Zhan, Tiomkin and \
          Abbeel (2019).\n\n{}",
         begin.elapsed().as_secs_f64(),
@@ -91,6 +91,16 @@ fn steps(value: f64) -> String {
 fn summary(of: &Summary) -> String {
     let (low, high) = of.interval();
     format!("{} ± {}<br>[{}, {}]", steps(of.mean), steps(of.sd), steps(low), steps(high))
+}
+
+/// A probability in per cent; never 100 % for less than certainty.
+fn percent(p: f64) -> String {
+    if p < 1.0 - 1e-12 && p > 0.9995 { "> 99.9 %".to_owned() } else { format!("{} %", number(100.0 * p, 1)) }
+}
+
+/// The same, where the return is known.
+fn known(of: &Option<Summary>) -> String {
+    of.as_ref().map_or("–".to_owned(), summary)
 }
 
 fn plus_minus((mean, sd): (f64, f64)) -> String {
@@ -288,9 +298,9 @@ fn beta_table(document: &mut Document, run: Run) -> Result<String, String> {
                 title.to_owned(),
                 capped.beta.to_string(),
                 summary(&capped.ensemble),
-                summary(&capped.clone),
-                summary(&uncapped.clone),
-                summary(&within.clone),
+                known(&capped.clone),
+                known(&uncapped.clone),
+                known(&within.clone),
             ]);
         }
     }
@@ -329,15 +339,17 @@ fn pareto(document: &mut Document, run: Run) -> Result<String, String> {
     for (name, file, color, config, seeds) in runs {
         let sweep = sweep(config, &betas, seeds, run)?;
         let points = sweep.points(WITHIN_T);
+        // Within T a return is known of every clone.
+        let clones: Vec<&Summary> = points.iter().filter_map(|point| point.clone.as_ref()).collect();
         // A word at every point would be a heap.
         let is_named =
             |beta: f64| if seeds == 10 { [0.0, 0.4, 0.5, 1.0].contains(&beta) } else { [0.1, 1.0].contains(&beta) };
         series.push(Series {
             name: name.to_owned(),
             color,
-            points: points.iter().map(|point| (point.ensemble.mean, point.clone.mean)).collect(),
+            points: points.iter().zip(&clones).map(|(point, clone)| (point.ensemble.mean, clone.mean)).collect(),
             mark: Mark::LineAndPoints,
-            intervals: Some(points.iter().map(|point| point.clone.interval()).collect()),
+            intervals: Some(clones.iter().map(|clone| clone.interval()).collect()),
             x_intervals: Some(points.iter().map(|point| point.ensemble.interval()).collect()),
             labels: Some(
                 points
@@ -406,17 +418,17 @@ fn benches(document: &mut Document, run: Run) -> Result<String, String> {
             number(100.0 * bench.ensemble.success, 1)
         );
         let head = words(&["cloner", "capped", "drop", "within T", "gap", "success", "pairs", "seconds"]);
-        let known = |value: Option<f64>| value.map_or("–".to_owned(), |value| number(value, 2));
+        let steps = |value: Option<f64>| value.map_or("–".to_owned(), |value| number(value, 2));
         let row = |attack: &Attack| {
             let r = &attack.returns;
             let error = if r.horizon_error > 0.0 { format!(" ± {:.2}", r.horizon_error) } else { String::new() };
             vec![
                 format!("`{}`", attack.attacker),
-                known(r.capped_return),
-                known(attack.drop),
+                steps(r.capped_return),
+                steps(attack.drop),
                 format!("{}{error}", number(r.horizon_return, 2)),
                 number(attack.imitation_gap, 2),
-                format!("{} %", number(100.0 * r.success, 1)),
+                percent(r.success),
                 attack.pairs.map_or("∞".to_owned(), |pairs| pairs.to_string()),
                 format!("{:.2}", attack.seconds),
             ]
@@ -424,7 +436,7 @@ fn benches(document: &mut Document, run: Run) -> Result<String, String> {
         table(&mut text, &head, attacks.iter().map(row));
         document.csv(name, bench.csv());
     }
-    text += "± is the 95 % interval of a simulation; the rest is exact for the clone that was made. The trap shows what the capped \
+    text += "All that is said of `gru` is simulated, ± is its 95 % interval; the rest is exact for the clone that was made. The trap shows what the capped \
              return hides: one expert walks, rarely, into a cell where both stay for ever, and the clone inherits that from nearly \
              everywhere; cut cell by cell it looks ruined, yet within T it does as well as the ensemble. An attacker who drops the \
              demonstrations that were cut off (`filtered`) is not even touched by it. (`history` has exactly the ensemble's law; its capped figure differs from the ensemble's as hitting \
@@ -580,7 +592,7 @@ fn memory(document: &mut Document, run: Run) -> Result<String, String> {
         let observer: ObserverChoice = observer.parse().map_err(|error| format!("{error}"))?;
         let found = sweep(Config { observer, ..Config::default() }, &betas, 3, run)?;
         for (row, point) in rows.iter_mut().zip(found.points(WITHIN_T)) {
-            row.extend([summary(&point.ensemble), summary(&point.clone)]);
+            row.extend([summary(&point.ensemble), known(&point.clone)]);
         }
         document.csv(&format!("against-{}", observer.model().name), found.csv());
     }
@@ -731,17 +743,19 @@ fn semantics(document: &mut Document) -> Result<String, String> {
 
 /// What follows; the figures in it that are ours come from runs.
 fn discussion(run: Run) -> Result<String, String> {
-    let mean = |sweep: &Sweep| sweep.points(CAPPED).first().map(|point| (point.ensemble.mean, point.clone.mean));
+    let mean = |sweep: &Sweep| {
+        let point = sweep.points(CAPPED).into_iter().next()?;
+        Some((point.ensemble.mean, point.clone?.mean))
+    };
     let replay = mean(&sweep(Config::paper(), &[0.6], 5, run)?).ok_or("a sweep has points")?;
     let split = sweep(Config::default(), &[0.3, 0.35, 0.4], 10, run)?;
-    let clones = split.points(CAPPED);
-    let (low, high) = (clones.first(), clones.last());
-    let spread = low.zip(high).ok_or("a sweep has points")?;
+    let clones: Vec<Summary> = split.points(CAPPED).into_iter().filter_map(|point| point.clone).collect();
+    let spread = clones.first().zip(clones.last()).ok_or("a sweep has points")?;
     Ok(DISCUSSION
         .replace("{replay ensemble}", &number(replay.0, 2))
         .replace("{replay clone}", &number(replay.1, 2))
-        .replace("{spread low}", &plus_minus((spread.0.clone.mean, spread.0.clone.sd)))
-        .replace("{spread high}", &plus_minus((spread.1.clone.mean, spread.1.clone.sd))))
+        .replace("{spread low}", &plus_minus((spread.0.mean, spread.0.sd)))
+        .replace("{spread high}", &plus_minus((spread.1.mean, spread.1.sd))))
 }
 
 const DISCUSSION: &str = "## Where we agree with the paper, where not, and why

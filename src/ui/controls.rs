@@ -169,7 +169,7 @@ fn show_field(ui: &mut Ui, field: &Field, explains: bool, config: &mut Config) {
                     }
                 }
             }
-            Kind::Word { options, get, set } => {
+            Kind::Word { options, get, set, .. } => {
                 let chosen = get(config);
                 let response = ComboBox::from_id_salt(field.name)
                     .selected_text(chosen.clone())

@@ -48,13 +48,13 @@ pub fn commands() -> [Command; 5] {
             .arg(out("Write the table to this CSV file")),
         with_setup(
             Command::new("table1").about("The paper's Table 1, with every cloner as a column"),
-            &["seed", "algorithm", "alpha"],
+            &["seed", "algorithm"],
         )
         .arg(seeds("5"))
         .arg(attackers())
         .arg(json())
         .arg(out("Write every run to this CSV file")),
-        with_setup(Command::new("sweep").about("Ensemble and clone for many β"), &["seed", "beta", "alpha"])
+        with_setup(Command::new("sweep").about("Ensemble and clone for many β"), &["seed", "beta"])
             .arg(
                 Arg::new("betas")
                     .long("betas")
@@ -270,7 +270,11 @@ pub fn table1(matches: &ArgMatches) -> Result<(), String> {
 }
 
 fn shown(summary: &Summary) -> String {
-    let (Summary { mean, sd, .. }, (low, high)) = (summary, summary.interval());
+    let Summary { mean, sd, values } = summary;
+    if values.len() == 1 {
+        return format!("{mean:8.2}");
+    }
+    let (low, high) = summary.interval();
     format!("{mean:8.2} ± {sd:5.2}  [{low:.2}, {high:.2}]")
 }
 
@@ -306,7 +310,8 @@ pub fn show_sweep(matches: &ArgMatches, sweep: &Sweep) -> Result<(), String> {
     for kind in [0, 2] {
         say!("{}, mean ± sd [95 % bootstrap interval] over seeds", RETURN_KINDS[kind].name);
         for point in sweep.points(kind) {
-            say!("  β = {:<5} ensemble {}   clone {}", point.beta, shown(&point.ensemble), shown(&point.clone));
+            let clone = point.clone.as_ref().map_or("not known of one that remembers".to_owned(), shown);
+            say!("  β = {:<5} ensemble {}   clone {clone}", point.beta, shown(&point.ensemble));
         }
     }
     Ok(())
