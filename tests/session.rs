@@ -22,6 +22,8 @@ struct Desk {
     started: Vec<Started>,
     refused: Vec<String>,
     exported: Vec<Exported>,
+    /// How far a run that is made again was said to be.
+    remade: Vec<u32>,
     /// Whether snapshots are answered.
     is_drawing: bool,
 }
@@ -36,6 +38,7 @@ impl Desk {
             started: Vec::new(),
             refused: Vec::new(),
             exported: Vec::new(),
+            remade: Vec::new(),
             is_drawing: true,
         }
     }
@@ -53,6 +56,7 @@ impl Desk {
                 Event::Ready { .. } => unreachable!("drivers say so, not sessions"),
                 Event::Started(started) => self.started.push(*started),
                 Event::Refused(sentence) => self.refused.push(sentence),
+                Event::Remade(updates) => self.remade.push(updates),
                 Event::Exported(exported) => self.exported.push(*exported),
                 Event::Snapshot(snapshot) => {
                     if self.is_drawing {
@@ -444,7 +448,7 @@ fn progress_grows_from_nothing_to_all() {
         assert!(outcome.unwrap().is_some());
         let grows = heard.is_sorted() && heard.iter().all(|share| (0.0..=1.0).contains(share));
         // What is done at once need not say anything.
-        let is_short = matches!(&task, Task::Attack { attacker, .. } if ["history_k", "filtered"].contains(&attacker.model().name));
+        let is_short = matches!(&task, Task::Attack { attacker, .. } if attacker.model().name == "filtered");
         assert!(grows && heard.is_empty() == is_short, "{task:?}: {heard:?}");
     }
 }
@@ -712,6 +716,22 @@ fn a_run_that_is_made_again_works_in_short_turns() {
     assert_eq!((desk.last().update, desk.last().recorded), (39, 40));
     // Forty updates, and seven of them again.
     assert!(turns >= 40 + 7 / 2, "{turns}");
+    // It is told how far it is, four times a second of those that this took.
+    let told = desk.remade.len() as f64;
+    assert!(desk.remade.is_sorted() && desk.remade[0] <= 2 && desk.remade.iter().all(|&update| update <= 40));
+    assert!((2.0..=desk.now.get() / 250.0 + 1.0).contains(&told), "{:?}", desk.remade);
+}
+
+/// Whoever sends commands without end while a moment is searched for is told so.
+#[test]
+fn commands_that_wait_are_not_without_number() {
+    let setup = Box::new(Setup { config: short(), ..Setup::default() });
+    let mut desk = Desk::new();
+    desk.send(Command::Resume { run: 1, setup, recorded: short().updates(), update: 3, is_playing: false });
+    (0..1000).for_each(|_| desk.send(Command::Step));
+    assert_eq!(desk.refused.len(), 0);
+    desk.send(Command::Step);
+    assert_eq!(desk.refused, ["1000 commands wait already."]);
 }
 
 #[test]

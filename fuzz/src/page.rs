@@ -56,6 +56,7 @@ pub fn check_events(grid: &mut Option<Grid>, events: &[Event]) {
             }
             Event::Exported(exported) => exported.check().expect("a session sends what can be saved"),
             Event::Refused(sentence) => assert!(sentence.len() < 2000, "{sentence}"),
+            Event::Remade(updates) => assert!(updates <= Config::MOST_UPDATES),
             Event::Ready { .. } => unreachable!("drivers say so"),
         }
     }

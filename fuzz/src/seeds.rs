@@ -144,6 +144,7 @@ pub fn events() -> Vec<Vec<u8>> {
         session.handle(Command::Export);
         messages.extend(session.events());
         messages.push(Event::Refused("No.".to_owned()));
+        messages.push(Event::Remade(7));
         joined(&messages.iter().map(encode).collect::<Vec<_>>())
     };
     let alpha = Setup { config: Config { alpha: Some(-4.0), ..setup().config }, ..setup() };

@@ -30,6 +30,15 @@ impl Course {
         self.turns.push((update, beta));
     }
 
+    /// Checks it, of a run of so many updates: turns in order and before the end. β itself is checked with its field.
+    pub fn check(&self, updates: u32) -> Result<(), SetupError> {
+        let is_ascending = self.turns.is_sorted_by(|(a, _), (b, _)| a < b);
+        let is_within = self.turns.last().is_none_or(|(last, _)| *last < updates);
+        let is_short = self.turns.len() <= Course::MOST_TURNS;
+        let is_run = self.updates.is_none_or(|updates| (1..=Config::MOST_UPDATES).contains(&updates));
+        if is_short && is_ascending && is_within && is_run { Ok(()) } else { Err(SetupError::Course) }
+    }
+
     /// β where it changes after so many updates.
     pub fn turn_at(&self, update: u32) -> Option<f64> {
         self.turns.iter().find(|(at, _)| *at == update).map(|(_, beta)| *beta)
@@ -87,17 +96,10 @@ impl Setup {
 
     /// Checks what is to change on the way.
     fn check_course(&self) -> Result<(), SetupError> {
-        let Course { turns, updates } = &self.course;
-        let is_ascending = turns.is_sorted_by(|(a, _), (b, _)| a < b);
-        let is_within = turns.last().is_none_or(|(last, _)| *last < self.updates());
-        let is_short = turns.len() <= Course::MOST_TURNS;
-        let is_run = updates.is_none_or(|updates| (1..=Config::MOST_UPDATES).contains(&updates));
-        if !is_short || !is_ascending || !is_within || !is_run {
-            return Err(SetupError::Course);
-        }
+        self.course.check(self.updates())?;
         // Of β alone: all else has been checked, and there may be thousands of them.
         let field = Field::named("beta");
-        turns.iter().try_for_each(|&(_, beta)| Ok(field.check(&Config { beta, ..Config::default() })?))
+        self.course.turns.iter().try_for_each(|&(_, beta)| Ok(field.check(&Config { beta, ..Config::default() })?))
     }
 
     /// β at the end of the run.
@@ -105,16 +107,15 @@ impl Setup {
         self.course.turns.last().map_or(self.config.beta, |(_, beta)| *beta)
     }
 
-    /// Whether the paper's figures are of this grid, number of experts and horizon.
+    /// Whether the paper's figures are of this grid, number of experts, horizon and reward.
     pub fn is_papers(&self) -> bool {
-        let Config { experts, horizon, .. } = self.config;
-        (&self.grid, experts, horizon) == (&GridSpec::default(), 2, HORIZON)
+        let Config { experts, horizon, ref adversary_reward, .. } = self.config;
+        (&self.grid, experts, horizon) == (&GridSpec::default(), 2, HORIZON) && adversary_reward.is_none()
     }
 
     /// Whether the paper's Table 1 is of the same, and of this β.
     pub fn is_papers_table(&self) -> bool {
-        let Config { beta, adversary_reward, .. } = &self.config;
-        self.is_papers() && *beta == Config::paper().beta && adversary_reward.is_none()
+        self.is_papers() && self.config.beta == Config::paper().beta
     }
 
     /// Reads a configuration file: the fields of [`Config`], alone or as `config`, with a `grid` where it is not the

@@ -80,6 +80,8 @@ impl Snapshot {
         self.clones.iter().try_for_each(|clone| clone.check(grid, n))?;
         returns(self.ensemble)?;
         at_most("turns of β", self.course.turns.len(), Course::MOST_TURNS)?;
+        self.course.check(self.last_update).map_err(|error| error.to_string())?;
+        at_most("updates shown", self.update as usize, self.recorded as usize)?;
         let betas = self.course.turns.iter().map(|(_, beta)| *beta).chain([self.beta]);
         within("β", 0.0, Config::MAX_BETA, betas)?;
         within("milliseconds of training", 0.0, f64::MAX, [self.training_ms].into_iter())?;

@@ -20,7 +20,7 @@ pub use pool::{Hand, Pool, TaskId};
 pub use protocol::{
     CloneView, Command, Event, Exported, OTHER_VERSION, PROTOCOL, PolicyView, RunState, Snapshot, Started, TaskEvent,
 };
-pub use protocol::{decode, encode};
+pub use protocol::{check_length, decode, encode, shortened, unreadable};
 pub use session::{IN_FLIGHT, Pace, Session};
 #[cfg(not(target_arch = "wasm32"))]
 pub use thread::{ThreadLink, thread_pool};

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeSet, VecDeque};
 
-use super::TaskEvent;
+use super::{TaskEvent, shortened};
 use crate::experiment::Task;
 
 /// A worker that does one task at a time: a Web Worker or a thread.
@@ -15,6 +15,11 @@ pub trait Hand {
 
     /// Gives up the task at hand.
     fn stop(&mut self);
+
+    /// Whether its program is on its way: it has been started and has not answered yet.
+    fn is_starting(&self) -> bool {
+        false
+    }
 }
 
 /// The number of a task, by which its news are told apart.
@@ -50,6 +55,11 @@ impl Pool {
     /// Number of hands that work at once.
     pub fn size(&self) -> usize {
         self.most
+    }
+
+    /// Whether a hand is on its way.
+    pub fn is_starting(&self) -> bool {
+        self.hands.iter().any(|(hand, _)| hand.is_starting())
     }
 
     /// Puts a task at the end of the queue.
@@ -94,6 +104,7 @@ impl Pool {
                         *busy = Some((id, task));
                         TaskEvent::Progress(if part.is_finite() { part.clamp(0.0, 1.0) } else { 0.0 })
                     }
+                    TaskEvent::Failed(sentence) => TaskEvent::Failed(shortened(sentence)),
                     event => event,
                 };
                 news.push((id, event));

@@ -11,7 +11,7 @@ use crate::mdp::{KnownReturns, Policy, Returns};
 
 /// Version of the messages: an old cached worker must not be taken for a new one. [`Event::Ready`] stays the
 /// first variant, so that every version can read every other's.
-pub const PROTOCOL: u32 = 9;
+pub const PROTOCOL: u32 = 10;
 
 /// What is said of a worker with another [`PROTOCOL`].
 pub const OTHER_VERSION: &str = "The worker is of another version than the page: reload the page.";
@@ -79,6 +79,8 @@ pub enum Event {
     Exported(Box<Exported>),
     /// A command was not carried out; the sentence says why.
     Refused(String),
+    /// So many updates have been made again of a run that [`Command::Resume`] names.
+    Remade(u32),
 }
 
 /// An ensemble, and which moment of which run it is.
@@ -192,6 +194,16 @@ impl CloneView {
     }
 }
 
+/// A sentence about a fault in a length that can be shown, whoever has said it.
+pub fn shortened(mut sentence: String) -> String {
+    const MOST: usize = 600;
+    if let Some((end, _)) = sentence.char_indices().nth(MOST) {
+        sentence.truncate(end);
+        sentence.push('…');
+    }
+    sentence
+}
+
 /// A message as bytes.
 pub fn encode(message: &impl Serialize) -> Vec<u8> {
     postcard::to_allocvec(message).expect("messages are plain data of known length")
@@ -199,13 +211,20 @@ pub fn encode(message: &impl Serialize) -> Vec<u8> {
 
 /// A message from bytes; a sentence when they are none.
 pub fn decode<'a, T: Deserialize<'a>>(bytes: &'a [u8]) -> Result<T, String> {
-    let wrong = |why: String| format!("A message could not be read ({why}).");
-    if bytes.len() > LONGEST {
-        return Err(wrong(format!("{} bytes: expected at most {LONGEST}", bytes.len())));
-    }
+    check_length(bytes.len())?;
     match postcard::take_from_bytes(bytes) {
         Ok((message, [])) => Ok(message),
-        Ok((_, rest)) => Err(wrong(format!("{} bytes are left over", rest.len()))),
-        Err(error) => Err(wrong(error.to_string())),
+        Ok((_, rest)) => Err(unreadable(&format!("{} bytes are left over", rest.len()))),
+        Err(error) => Err(unreadable(&error.to_string())),
     }
+}
+
+/// Whether a message of so many bytes may be taken in at all: to be asked before it is copied.
+pub fn check_length(bytes: usize) -> Result<(), String> {
+    if bytes <= LONGEST { Ok(()) } else { Err(unreadable(&format!("{bytes} bytes: expected at most {LONGEST}"))) }
+}
+
+/// What is said of a message that is none.
+pub fn unreadable(why: &str) -> String {
+    format!("A message could not be read ({why}).")
 }

@@ -26,6 +26,8 @@ const MOST_CURVE_POINTS: u32 = 1200;
 
 /// Clones that may be shown besides that of the run's own observer.
 const MOST_SHOWN: usize = 16;
+/// Commands that may wait for a moment that is searched for: far more than a visitor gives.
+const MOST_WAITING: usize = 1000;
 /// Updates per second that can be asked for.
 const SPEEDS: RangeInclusive<f32> = 0.01..=1e6;
 
@@ -106,6 +108,8 @@ struct Resuming {
     is_playing: bool,
     /// Whether all that had been made is there again.
     is_complete: bool,
+    /// When it is told next how far it is.
+    next_news: f64,
 }
 
 impl Session {
@@ -135,6 +139,10 @@ impl Session {
             if matches!((&command, self.waiting.last()), (Command::Seek { .. }, Some(Command::Seek { .. }))) {
                 self.waiting.pop();
             }
+            if self.waiting.len() >= MOST_WAITING {
+                self.outbox.push(Event::Refused(format!("{MOST_WAITING} commands wait already.")));
+                return;
+            }
             return self.waiting.push(command);
         }
         if let Err(sentence) = self.carry_out(command) {
@@ -156,7 +164,7 @@ impl Session {
                 resumed.is_playing &= recorded > 0;
                 self.put(resumed);
                 self.runs = run;
-                self.resuming = Some(Resuming { update, is_playing, is_complete: false });
+                self.resuming = Some(Resuming { update, is_playing, is_complete: false, next_news: 0.0 });
             }
             Command::Retrain { beta } => {
                 let is_resuming = self.resuming.is_some();
@@ -349,6 +357,15 @@ impl Session {
         self.catch_up();
     }
 
+    /// How far a run that is made again is, four times a second: it may take minutes.
+    fn tell_remade(&mut self, now: f64) {
+        let Some(run) = self.run.as_ref().filter(|run| run.is_playing) else { return };
+        if let Some(resuming) = self.resuming.as_mut().filter(|resuming| now >= resuming.next_news) {
+            resuming.next_news = now + 250.0;
+            self.outbox.push(Event::Remade(run.trainer().updates()));
+        }
+    }
+
     /// Does what had to wait, up to what has to wait again.
     fn catch_up(&mut self) {
         for command in std::mem::take(&mut self.waiting) {
@@ -371,6 +388,7 @@ impl Session {
             pace = Pace::Now;
         }
         if self.resuming.is_some() {
+            self.tell_remade(clock());
             self.finish_resuming();
             return Pace::Now;
         }

@@ -14,7 +14,10 @@ use web_sys::{DedicatedWorkerGlobalScope, MessageChannel, MessageEvent, Worker, 
 
 use super::{faults, measures};
 use crate::experiment::Task;
-use crate::lab::{Command, Event, Hand, Link, OTHER_VERSION, PROTOCOL, Pace, Pool, Session, TaskEvent, decode, encode};
+use crate::lab::{
+    Command, Event, Hand, Link, OTHER_VERSION, PROTOCOL, Pace, Pool, Session, TaskEvent, check_length, decode, encode,
+    unreadable,
+};
 
 const SESSION: &str = "session";
 const TASKS: &str = "tasks";
@@ -94,10 +97,8 @@ impl<E: DeserializeOwned + Debug + 'static> Line<E> {
                     }
                 });
             }
-            deliver(match message.data().dyn_into::<ArrayBuffer>() {
-                Ok(buffer) => decode(&Uint8Array::new(&buffer).to_vec()),
-                Err(other) => Err(other.as_string().unwrap_or_default()),
-            });
+            let failure = message.data().as_string();
+            deliver(failure.map_or_else(|| read(&message), Err));
         });
         let on_error = Closure::<dyn Fn(web_sys::Event)>::new(move |error: web_sys::Event| {
             error.prevent_default();
@@ -151,6 +152,13 @@ impl<E> Drop for Line<E> {
     fn drop(&mut self) {
         self.close();
     }
+}
+
+/// The bytes of a message, read; a sentence when they are none, or too many to be copied.
+fn read<T: DeserializeOwned>(message: &MessageEvent) -> Result<T, String> {
+    let buffer = message.data().dyn_into::<ArrayBuffer>().map_err(|_| unreadable("expected bytes"))?;
+    check_length(buffer.byte_length() as usize)?;
+    decode(&Uint8Array::new(&buffer).to_vec())
 }
 
 /// The page's end of the session.
@@ -239,6 +247,10 @@ impl Hand for WorkerHand {
         }
     }
 
+    fn is_starting(&self) -> bool {
+        self.line.is_some() && !self.is_ready
+    }
+
     /// A worker at work hears nothing: it is ended, and the next task gets a new one.
     fn stop(&mut self) {
         (self.line, self.is_ready, self.next) = (None, false, None);
@@ -280,8 +292,7 @@ fn do_tasks(scope: DedicatedWorkerGlobalScope) {
             }
             true
         };
-        let task: Result<Task, String> = decode(&Uint8Array::new(&message.data()).to_vec());
-        let outcome = task.and_then(|task| task.run(&now, &mut progress));
+        let outcome = read(&message).and_then(|task: Task| task.run(&now, &mut progress));
         match outcome {
             Ok(Some(outcome)) => post(scope, &TaskEvent::Done(Box::new(outcome), now() - begun)),
             Ok(None) => {}
@@ -320,7 +331,7 @@ fn run_session(scope: DedicatedWorkerGlobalScope) {
     }));
     let receiver = driver.clone();
     let on_message = Closure::<dyn Fn(MessageEvent)>::new(move |message: MessageEvent| {
-        match decode(&Uint8Array::new(&message.data()).to_vec()) {
+        match read(&message) {
             Ok(command) => receiver.session.borrow_mut().handle(command),
             Err(sentence) => post(&receiver.scope, &Event::Refused(sentence)),
         }

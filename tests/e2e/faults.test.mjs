@@ -96,11 +96,23 @@ const watched = (page) =>
     };
   });
 
+/** Has the program of the training worker panic: an error of the browser's that nobody hears leaves its state in use. */
+async function panic(page) {
+  await page.workers().at(-1).evaluate(() => {
+    self.addEventListener("error", (event) => event.preventDefault());
+    performance.now = () => {
+      delete performance.now;
+      throw new Error("no clock");
+    };
+  });
+  // Whatever it is told next.
+  await page.evaluate(() => window.watch.workers.at(-1).postMessage("nothing"));
+}
+
 for (const [fault, sentence, cause] of [
   ["throws", /out of luck/, (page) => page.workers()[0].evaluate(() => setTimeout(() => { throw new Error("out of luck"); }))],
   ["is ended without a word", /the browser has ended it/, (page) => page.workers()[0].evaluate(() => self.close())],
-  // No array of the program can have so many bytes.
-  ["panics", /capacity overflow, .*\.rs:\d+:\d+/, (page) => page.evaluate(() => window.watch.workers[0].postMessage(2 ** 31))],
+  ["panics", /borrowed.*, .*\.rs:\d+:\d+/, panic],
 ]) {
   test(`a worker that ${fault} in the middle of a run is replaced, and the run goes on to the same end`, async () => {
     const { digest: end, curve } = await expected();
@@ -122,23 +134,45 @@ for (const [fault, sentence, cause] of [
   });
 }
 
+test("what is no message, or too long for one, is refused with a sentence, and the run goes on", async () => {
+  const { digest: end } = await expected();
+  const { page, problems, close } = await open(browser, site.address + SLOW, { before: watched });
+  await midRun(page, 50);
+  for (const [bytes, sentence] of [[2 ** 31, /could not be read \(expected bytes\)/], [null, /20000000 bytes: expected at most 16000000/]]) {
+    await page.evaluate((message) => window.watch.workers[0].postMessage(message ?? new ArrayBuffer(2e7)), bytes);
+    await alert(page, sentence).waitFor(PATIENCE);
+    await click(page, "button", "Dismiss");
+  }
+  assert.equal(await page.evaluate(() => window.watch.workers.length), 1);
+  // From the worker: it is not trusted any more, and what it says is shown in a length that can be read.
+  const forge = (data) => page.evaluate((data) => window.watch.workers.at(-1).dispatchEvent(new MessageEvent("message", { data: data ?? new ArrayBuffer(2e7) })), data);
+  for (const [data, sentence] of [[null, /20000000 bytes: expected at most 16000000.*started again/], ["x".repeat(1e6), /^x{600}….*started again/]]) {
+    await forge(data);
+    await alert(page, sentence).waitFor(PATIENCE);
+    await click(page, "button", "Dismiss");
+  }
+  await trained(page);
+  assert.equal(await digest(page), end);
+  assert.deepEqual(problems, []);
+  await close();
+});
+
 test("a worker that dies again and again is not started for ever", async () => {
   const { page, context, close } = await open(browser, site.address + SLOW, { before: watched });
   await context.grantPermissions(["clipboard-read", "clipboard-write"]);
   await midRun(page, 50);
-  const break_ = (index) => page.evaluate((index) => window.watch.workers[index].postMessage(2 ** 31), index);
   for (let times = 0; times < 4; times++) {
     // Each time once the run goes on.
     const now = await shownUpdate(page);
     await until(() => shownUpdate(page), (update) => update > now);
-    await break_(times);
+    await panic(page);
     if (times < 3) await page.waitForFunction((count) => window.watch.workers.length === count, times + 2, PATIENCE);
   }
   await alert(page, "training needs a new worker").waitFor(PATIENCE);
   assert.equal(await page.evaluate(() => window.watch.workers.length), 4);
   await click(page, "button", "Copy the report");
   const report = await until(() => page.evaluate(() => navigator.clipboard.readText()), (text) => text !== "");
-  for (const line of [/^ape-lab \d+\.\d+\.\d+$/m, /capacity overflow, .*\.rs:\d+/, /to session: Resume/, /from session: Snapshot/, /speed=60/]) {
+  for (const line of [/^ape-lab \d+\.\d+\.\d+$/m, /borrowed.*, .*\.rs:\d+/, /to session: Resume/, /from session: Snapshot/, /speed=60/]) {
     assert.match(report, line);
   }
   await pictures(page, "worker-failed");
@@ -323,7 +357,7 @@ test("an experiment goes on while the page is hidden, and says how long it took"
   await done.waitFor(PATIENCE);
   const text = await done.textContent();
   // Not as long as the last picture was young, nor with the minute that nobody looked.
-  const [seconds, times] = [/done in ([\d.]+) s/, /([\d.]+) times as fast/].map((part) => Number(text.match(part)?.[1] ?? 1));
+  const [seconds, times] = [/done in ([\d.]+) s/, /([\d.]+) of \d+ workers busy/].map((part) => Number(text.match(part)?.[1] ?? 1));
   assert.ok(seconds > worked - 0.5 && seconds < 60 && times <= (await page.evaluate(() => navigator.hardwareConcurrency)), text);
   assert.deepEqual(problems, []);
   await close();
@@ -511,6 +545,16 @@ test("a worker that never comes can be replaced, and is not waited for in silenc
   await trained(page);
   assert.equal(await page.getByRole("alert").count(), 0);
   assert.equal(asked, 2);
+  // One of an experiment's workers: the others work, and who cancels can begin again.
+  asked = 0;
+  await click(page, "radio", "Tab: β sweep");
+  await widget(page, "button", "Sweep").waitFor(PATIENCE);
+  await click(page, "button", "Sweep");
+  await says(page, /^A worker does not answer/);
+  await click(page, "button", "Cancel");
+  await page.getByRole("status").filter({ hasText: /^stopped after/ }).waitFor(PATIENCE);
+  await click(page, "button", "Sweep");
+  await page.getByRole("status").filter({ hasText: /^done in/ }).waitFor(PATIENCE);
   assert.deepEqual(problems, []);
   await close();
 });
