@@ -861,6 +861,10 @@ fn a_dead_worker_is_replaced_and_the_run_goes_on() {
     assert_eq!(here.0.borrow().starts, 4);
     page.get_by(|node| says(node).is_some_and(|text| text == "stopped at update 100 of 732"));
     assert_eq!(figure(&page, "Ensemble capped"), before.0);
+    // There is nobody who could show another moment: the timeline stays where the picture is.
+    page.state_mut().as_mut().unwrap().seek(300);
+    page.run_steps(2);
+    page.get_by(|node| says(node).is_some_and(|text| text == "100 of 732"));
     page.get_by_role_and_label(Role::Button, "Copy the report").click_accesskit();
     page.step();
     let copied = page.output().platform_output.commands.iter().any(|command| {
@@ -880,6 +884,38 @@ fn a_dead_worker_is_replaced_and_the_run_goes_on() {
     page.run_steps(3);
     settle(&mut page);
     assert!(figure(&page, "Clone ÷ ensemble capped") < 1.2);
+}
+
+/// A long run takes its time to be made again: the page says how far that is, and then what it said before.
+#[test]
+fn a_run_that_is_made_again_says_how_far_it_is() {
+    let (mut page, here) = open(1280.0, 800.0);
+    let before = text(&page, "trained, update 732 of 732");
+    here.0.borrow_mut().hangs = true;
+    here.0.borrow_mut().events.push_back(Err("The worker has stopped (out of memory).".to_owned()));
+    here.0.borrow_mut().hangs = false;
+    page.step();
+    // What the new one says first; the rest of it is held back.
+    here.0.borrow_mut().events.push_back(Ok(Event::Remade(300)));
+    page.run_steps(1);
+    here.0.borrow_mut().hangs = true;
+    page.run_steps(2);
+    page.get_by(|node| {
+        node.role() == Role::Status && says(node).is_some_and(|text| text == "made again: update 300 of 732")
+    });
+    here.0.borrow_mut().hangs = false;
+    settle(&mut page);
+    let digest = |text: &str| text.rsplit(' ').next().unwrap().to_owned();
+    assert_eq!(digest(&text(&page, "trained, update 732 of 732")), digest(&before));
+}
+
+/// A sentence that fills the page, as of a worker that has gone mad, is cut.
+#[test]
+fn a_sentence_is_no_longer_than_can_be_read() {
+    let (mut page, here) = open(1280.0, 800.0);
+    here.0.borrow_mut().events.push_back(Ok(Event::Refused("ä".repeat(1_000_000))));
+    page.run_steps(3);
+    assert_eq!(text(&page, "ää").chars().count(), 601);
 }
 
 /// What the session refuses is said on the page.
@@ -1053,7 +1089,7 @@ fn files_are_opened_or_refused_with_a_sentence() {
     settle(&mut page);
     page.run_steps(20);
     page.get_by(|node| {
-        says(node).is_some_and(|text| text == "given ensemble, nothing to train, digest 0123456789abcdef")
+        says(node).is_some_and(|text| text == "given ensemble, nothing to train, digest by its file 0123456789abcdef")
     });
     go_to(&mut page, "Attack bench");
     press(&mut page, "Save the ensemble");
@@ -1102,6 +1138,66 @@ fn a_slow_clone_can_be_shown_in_a_panel() {
     page.run_steps(4);
     page.get_by_label("p(2|s)");
     assert_eq!(page.query_all_by_label("–").count(), 2);
+}
+
+/// Who drags the timeline has no clone begun for each moment passed: it is made where the hand rests.
+#[test]
+fn a_slow_clone_waits_for_the_hand_to_rest() {
+    let (mut page, here) = open(1280.0, 800.0);
+    let app = page.state_mut().as_mut().unwrap();
+    let clones = vec!["uniform".parse().unwrap(), "bc_counts(1000)".parse().unwrap()];
+    app.view.clones = clones.clone();
+    app.send(Command::Show(clones));
+    page.run_steps(8);
+    let asked = || here.0.borrow().commands.iter().filter(|&command| *command == Command::Export).count();
+    assert_eq!(asked(), 1);
+    for update in 100..130 {
+        page.state_mut().as_mut().unwrap().seek(update);
+        page.step();
+    }
+    assert_eq!(asked(), 1);
+    page.run_steps(8);
+    assert_eq!(asked(), 2);
+    page.get_by(|node| {
+        node.role() == Role::Image && says(node).is_some_and(|text| text.starts_with("Clone (bc_counts(1000))"))
+    });
+}
+
+/// Results that are of another ensemble, or of other settings than those beside them, say so.
+#[test]
+fn old_results_say_that_they_are() {
+    let (mut page, _) = open(1280.0, 800.0);
+    let says_so = |page: &Page, what: &str| page.query_by_label_contains(what).is_some();
+    let (changed, other) = ("The ensemble on the page has changed since", "Made with other settings");
+    go_to(&mut page, "Attack bench");
+    page.run_steps(3);
+    only(&mut page, &["uniform"]);
+    press(&mut page, "Attack the ensemble shown");
+    text(&page, "The ensemble after update 732 returns");
+    assert!(!says_so(&page, changed));
+    go_to(&mut page, "β sweep");
+    page.run_steps(3);
+    press(&mut page, "Paper's table");
+    page.run_steps(30);
+    // Its own β are in the table.
+    page.state_mut().as_mut().unwrap().set_beta(0.3);
+    settle(&mut page);
+    assert!(!says_so(&page, other));
+    page.get_by(|node| says(node).is_some_and(|text| text == "−144.76 ± 55.68"));
+    go_to(&mut page, "Attack bench");
+    page.run_steps(3);
+    assert!(says_so(&page, changed));
+    // The paper's table is of the paper's reward.
+    let config =
+        Config { adversary_reward: "0,9=-1".parse().ok(), ..page.state().as_ref().unwrap().setup().config.clone() };
+    page.state_mut().as_mut().unwrap().reconfigure(config);
+    settle(&mut page);
+    go_to(&mut page, "β sweep");
+    page.run_steps(3);
+    assert!(says_so(&page, other));
+    press(&mut page, "Paper's table");
+    page.run_steps(30);
+    assert!(!says_so(&page, other) && !says_so(&page, "−144.76 ± 55.68"));
 }
 
 /// A clone that could not be made is not waited for.
@@ -1554,6 +1650,28 @@ fn a_world_is_drawn_and_trained_in() {
     settle(&mut page);
     let app = page.state().as_ref().unwrap();
     assert_eq!((app.setup().grid.rows, app.setup().grid.cols), (4, 10));
+    // A drag of a control is one edit, however many worlds it goes through.
+    let slip = page.get_by_role_and_label(Role::Slider, "Slip").rect();
+    page.drag_at(slip.left_center() + egui::vec2(8.0, 0.0));
+    page.run_steps(2);
+    for x in [0.3, 0.5, 0.7] {
+        page.hover_at(egui::pos2(egui::lerp(slip.x_range(), x), slip.center().y));
+        page.run_steps(2);
+    }
+    page.drop_at(egui::pos2(egui::lerp(slip.x_range(), 0.7), slip.center().y));
+    page.run_steps(3);
+    assert!(page.state().as_ref().unwrap().setup().grid.slip > 0.3);
+    press(&mut page, "Undo");
+    assert_eq!(page.state().as_ref().unwrap().setup().grid.slip, 0.0);
+    // Who finds the board by a screen reader gets its keys.
+    page.get_by(|node| says(node).is_some_and(|text| text.starts_with("World: row"))).click_accesskit();
+    page.run_steps(2);
+    page.key_press(egui::Key::ArrowRight);
+    page.run_steps(2);
+    text(&page, "World: row");
+    assert!(
+        page.get_by(|node| says(node).is_some_and(|text| text.starts_with("World: row"))).accesskit_node().is_focused()
+    );
 }
 
 /// What was typed for one run does not go over into the next that has another value there.
@@ -1694,6 +1812,26 @@ fn a_command_changes_no_more_than_it_says() {
     page.run_steps(4);
     let grid = &page.state().as_ref().unwrap().setup().grid;
     assert_eq!((grid.slip, &grid.walls), (0.25, &world.grid().walls));
+    // The last letters and Enter in one frame: what is written then counts, not what was before.
+    page.state_mut().as_mut().unwrap().palette.open();
+    page.run_steps(2);
+    page.event(egui::Event::Text("Go to: Race".to_owned()));
+    page.key_down(egui::Key::Enter);
+    page.run_steps(2);
+    page.key_up(egui::Key::Enter);
+    page.run_steps(2);
+    text(&page, "Nobody has raced yet");
+    // Behind the table of policies no key does anything.
+    page.key_press(egui::Key::T);
+    page.run_steps(2);
+    page.key_press(egui::Key::Num2);
+    page.run_steps(2);
+    text(&page, "Nobody has raced yet");
+    page.key_press(egui::Key::T);
+    page.run_steps(2);
+    page.key_press(egui::Key::Num2);
+    page.run_steps(2);
+    assert!(page.query_by_label_contains("Nobody has raced yet").is_none());
 }
 
 /// Where a step's figures need a clone that the visitor has put away, it says which.

@@ -233,8 +233,8 @@ fn read_view(
     }
     if let Some(value) = take(pairs, "clones") {
         match value.split(';').map(str::parse).collect::<Result<Vec<AttackerChoice>, _>>() {
-            Ok(read) if (1..=2).contains(&read.len()) => *clones = read,
-            _ => return bad("clones", &value, "one or two cloners, as uniform;occupancy"),
+            Ok(read) if matches!(&read[..], [_]) || matches!(&read[..], [a, b] if a != b) => *clones = read,
+            _ => return bad("clones", &value, "one cloner or two different ones, as uniform;occupancy"),
         }
     }
     if let Some(value) = take(pairs, "cell") {

@@ -21,7 +21,7 @@ use crate::ape::{Config, Digest, EnsembleFile};
 use crate::attack::AttackerChoice;
 use crate::experiment::{Course, CurvePoint, Denied, PRESETS, Setup};
 use crate::lab::{
-    Command, Event, Exported, IN_FLIGHT, Link, OTHER_VERSION, PROTOCOL, Pool, RunState, Snapshot, Started,
+    Command, Event, Exported, IN_FLIGHT, Link, OTHER_VERSION, PROTOCOL, Pool, RunState, Snapshot, Started, shortened,
 };
 use crate::mdp::GridSpec;
 
@@ -118,8 +118,8 @@ pub enum Session {
     Failed(String),
 }
 
-/// How long the session may owe an answer before the visitor is offered another, in seconds.
-const PATIENCE: f64 = 10.0;
+/// How long a worker may owe an answer before the visitor is offered another, in seconds.
+pub(super) const PATIENCE: f64 = 10.0;
 /// Single updates that may be on their way: a key that is held down would fill a slow worker's inbox.
 const MOST_STEPS: u32 = 4;
 
@@ -142,6 +142,8 @@ pub struct App {
     silence: f64,
     /// Whether the session that has died showed its last run: another can go on with it.
     can_resume: bool,
+    /// How many updates it has made again of that run, which it shows once it is where it was.
+    pub(super) remade: Option<u32>,
     /// What the controls say; the session is told of every change.
     pub(super) setup: Setup,
     /// The place in [`PRESETS`] that `setup` was taken from, as long as nothing was changed since.
@@ -240,6 +242,7 @@ impl App {
             continued: None,
             silence: 0.0,
             can_resume: false,
+            remade: None,
             setup: Setup::default(),
             preset: None,
             begun: None,
@@ -320,10 +323,11 @@ impl App {
         self.shown.as_ref()
     }
 
-    /// What is collected of r̃, where the run denies the clone that.
-    pub fn denied(&self) -> Option<Denied> {
+    /// What is collected of r̃, where the run denies the clone that, and the update at which it was: the last of the curve.
+    pub fn denied(&self) -> Option<(u32, Denied)> {
         let shown = self.shown.as_ref()?;
-        shown.curve.iter().rfind(|point| point.update <= shown.snapshot.update)?.denied
+        let point = shown.curve.iter().rfind(|point| point.update <= shown.snapshot.update)?;
+        point.denied.map(|denied| (point.update, denied))
     }
 
     /// Whether a run is on its way that has not shown anything yet: what is on the page is not what the controls say.
@@ -548,7 +552,8 @@ impl App {
     }
 
     fn go_to(&mut self, update: u32) {
-        let Some(shown) = &mut self.shown else { return };
+        // Nobody would make that moment.
+        let Some(shown) = self.shown.as_mut().filter(|_| !matches!(self.session, Session::Failed(_))) else { return };
         shown.remember_end();
         let update = update.min(shown.snapshot.recorded);
         let run = shown.snapshot.run;
@@ -632,7 +637,7 @@ impl App {
                             // With the run before went what was still wanted of it.
                             self.wanted.clear();
                         }
-                        self.begun = Some(*started);
+                        (self.begun, self.remade) = (Some(*started), None);
                     }
                     Err(sentence) => self.distrust(&sentence),
                 },
@@ -644,13 +649,14 @@ impl App {
                     Ok(()) => self.take_ensemble(*exported),
                     Err(sentence) => self.distrust(&sentence),
                 },
+                Ok(Event::Remade(updates)) => self.remade = Some(updates),
                 Ok(Event::Refused(sentence)) => {
                     (self.asked, self.continued) = (Asked::Nothing, None);
                     self.stepped = 0;
                     self.wanted.clear();
-                    self.notice = Some(sentence);
+                    self.notice = Some(shortened(sentence));
                 }
-                Err(sentence) => self.lose_session(sentence),
+                Err(sentence) => self.lose_session(shortened(sentence)),
             }
         }
         let now = self.clock();
@@ -679,6 +685,7 @@ impl App {
     /// Takes in the time, and counts how long the session has been silent.
     pub(super) fn tick(&mut self, ctx: &egui::Context) {
         let before = std::mem::replace(&mut self.now, ctx.input(|input| input.time));
+        self.look_after_slow_clones(ctx);
         // That a run has begun is said at once, but where another comes to its end before.
         let is_due = matches!(self.session, Session::Starting) || self.asked == Asked::Waits && self.begun.is_none();
         if is_due {
@@ -745,7 +752,7 @@ impl App {
     /// Nothing more comes of what the session was asked for.
     fn forget_session(&mut self) {
         (self.asked, self.begun, self.continued) = (Asked::Nothing, None, None);
-        (self.silence, self.seen, self.stepped) = (0.0, 0, 0);
+        (self.silence, self.seen, self.stepped, self.remade) = (0.0, 0, 0, None);
         self.wanted.clear();
     }
 
@@ -789,7 +796,7 @@ impl App {
     /// Puts a snapshot on the page.
     fn take(&mut self, mut snapshot: Snapshot) {
         self.taken += 1;
-        self.stepped = 0;
+        (self.stepped, self.remade) = (0, None);
         self.undrawn = Some(snapshot.number);
         let points = std::mem::take(&mut snapshot.curve);
         if let Some(started) = self.begun.take_if(|begun| begun.run == snapshot.run) {

@@ -20,8 +20,9 @@ pub struct Shown {
     pub curve: Vec<CurvePoint>,
     /// The run at its last update, where an earlier one is shown.
     pub end: Option<Box<Snapshot>>,
-    /// Another one for every snapshot there ever was on the page.
+    /// Another one for every snapshot there ever was on the page; and that of the first of this run.
     pub version: u64,
+    pub run_version: u64,
     pub grid: Grid,
 }
 
@@ -33,7 +34,7 @@ impl Shown {
     pub fn new(started: Started, snapshot: Snapshot, curve: Vec<CurvePoint>, version: u64) -> Option<Shown> {
         let given = started.setup.ensemble.as_ref().map(|ensemble| &ensemble.grid);
         let grid = Grid::new(given.unwrap_or(&started.setup.grid).clone()).ok()?;
-        Some(Shown { started, snapshot, curve, end: None, version, grid })
+        Some(Shown { started, snapshot, curve, end: None, version, run_version: version, grid })
     }
 
     /// Keeps the snapshot for when another moment is shown, where it is the last there is.
@@ -120,7 +121,8 @@ impl Shown {
         pictures: &mut Pictures,
     ) -> Touched {
         let rewards = self.rewards();
-        let ground = Ground { grid: &self.grid, version: self.version, rewards: &rewards };
+        let ground =
+            Ground { grid: &self.grid, version: self.version, run_version: self.run_version, rewards: &rewards };
         panels::show(ui, panels, plan, &ground, view, pictures)
     }
 

@@ -346,13 +346,18 @@ pub fn listen(ctx: &Context, app: &mut App) {
         return;
     }
     let has_focus = ctx.memory(|memory| memory.focused().is_some());
-    let is_blocked = app.view.is_help_open || app.palette.is_open();
+    // What is open over the page: all that is left is the key that opened it.
+    let open = match () {
+        () if app.view.is_help_open || app.palette.is_open() => Some("help"),
+        () if app.view.is_table_open => Some("table"),
+        () => None,
+    };
     for command in &COMMANDS {
         for keys in command.keys {
             const OF_WIDGETS: [Key; 7] =
                 [Key::Space, Key::ArrowLeft, Key::ArrowRight, Key::ArrowUp, Key::ArrowDown, Key::Home, Key::End];
             let is_taken =
-                (has_focus && OF_WIDGETS.contains(&keys.logical_key)) || (is_blocked && command.name != "help");
+                (has_focus && OF_WIDGETS.contains(&keys.logical_key)) || open.is_some_and(|open| command.name != open);
             let presses = if is_taken { 0 } else { ctx.input_mut(|input| take_key(input, keys)) };
             if presses > 0 && (command.can)(app) {
                 (0..presses).for_each(|_| (command.run)(app, ctx));
@@ -363,7 +368,7 @@ pub fn listen(ctx: &Context, app: &mut App) {
         }
     }
     for (key, (tab, ..)) in TAB_KEYS.into_iter().zip(TABS) {
-        if !is_blocked && ctx.input(|input| input.modifiers.is_none() && input.key_pressed(key)) {
+        if open.is_none() && ctx.input(|input| input.modifiers.is_none() && input.key_pressed(key)) {
             app.view.tab = tab;
             ctx.request_repaint();
         }
@@ -447,23 +452,10 @@ fn matches(query: &str, text: &str) -> bool {
 /// Draws the palette, when it is open.
 pub fn show_palette(ctx: &Context, app: &mut App) {
     let Some(mut query) = app.palette.query.take() else { return };
-    let mut found: Vec<_> =
-        lines().into_iter().filter(|(_, title, help, _)| matches(&query, &format!("{title} {help}"))).collect();
-    // Those whose title says it come first.
-    found.sort_by_key(|(_, title, ..)| !matches(&query, title));
-    let mut chosen = app.palette.chosen.min(found.len().saturating_sub(1));
-    ctx.input_mut(|input| {
-        if input.consume_key(Modifiers::NONE, Key::ArrowDown) {
-            chosen = (chosen + 1).min(found.len().saturating_sub(1));
-        }
-        if input.consume_key(Modifiers::NONE, Key::ArrowUp) {
-            chosen = chosen.saturating_sub(1);
-        }
-    });
-    let is_entered = ctx.input_mut(|input| input.consume_key(Modifiers::NONE, Key::Enter));
-    let is_left = ctx.input_mut(|input| input.consume_key(Modifiers::NONE, Key::Escape));
-    let is_moved = chosen != app.palette.chosen;
-    let mut done = found.get(chosen).filter(|_| is_entered).map(|line| line.0);
+    let pressed = |key| ctx.input_mut(|input| input.consume_key(Modifiers::NONE, key));
+    let (downs, ups) = (pressed(Key::ArrowDown), pressed(Key::ArrowUp));
+    let (is_entered, is_left) = (pressed(Key::Enter), pressed(Key::Escape));
+    let (mut chosen, mut done) = (app.palette.chosen, None);
     let screen = ctx.content_rect().size();
     let response = Modal::new(egui::Id::unique("palette"))
         .frame(Frame::popup(&ctx.global_style()).inner_margin(12))
@@ -476,6 +468,15 @@ pub fn show_palette(ctx: &Context, app: &mut App) {
             if edit.accessible_name("Find a command").changed() {
                 chosen = 0;
             }
+            // By what is written now: the last letters and Enter may come in one frame.
+            let mut found: Vec<_> =
+                lines().into_iter().filter(|(_, title, help, _)| matches(&query, &format!("{title} {help}"))).collect();
+            // Those whose title says it come first.
+            found.sort_by_key(|(_, title, ..)| !matches(&query, title));
+            let last = found.len().saturating_sub(1);
+            chosen = (chosen + usize::from(downs)).min(last).saturating_sub(usize::from(ups));
+            let is_moved = chosen != app.palette.chosen;
+            done = found.get(chosen).filter(|_| is_entered).map(|line| line.0);
             ScrollArea::vertical().max_height((screen.y - 160.0).min(420.0)).auto_shrink([false, true]).show(
                 ui,
                 |ui| {

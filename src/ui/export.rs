@@ -204,6 +204,8 @@ fn legend(shown: &Shown, view: &View) -> String {
 }
 
 fn source(shown: &Shown) -> String {
-    let digest = shown.snapshot.digest.map_or(String::new(), |digest| format!(", digest {digest}"));
+    // Of a given ensemble its file says so, and policies alone do not give it back.
+    let whose = if shown.snapshot.state == RunState::Given { "digest by its file" } else { "digest" };
+    let digest = shown.snapshot.digest.map_or(String::new(), |digest| format!(", {whose} {digest}"));
     format!("ape-lab {}{digest}.", env!("CARGO_PKG_VERSION"))
 }

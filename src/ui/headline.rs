@@ -180,9 +180,10 @@ fn sentence(app: &App) -> String {
     // Below this share of arrivals steps are not the story.
     let is_lost = |returns: &KnownReturns| returns.success < 0.9;
     let (ensemble, clone) = (&KnownReturns::from(headline.ensemble), &headline.clone);
-    if let Some(denied) = app.denied() {
+    if let Some((update, denied)) = app.denied() {
+        let when = if update == snapshot.update { String::new() } else { format!(" at update {update}") };
         return format!(
-            "{experts} {reach} the goal in {} steps; of r̃ an expert collects {}, the clone that is to be denied it {}.",
+            "{experts} {reach} the goal in {} steps; of r̃ an expert collects{when} {}, the clone that is to be denied it {}.",
             steps(ensemble),
             numbers::decimal(denied.ensemble, 1),
             numbers::decimal(denied.clone, 1)
@@ -212,6 +213,9 @@ fn progress(app: &App) -> String {
     match snapshot.state {
         _ if !app.is_session_alive() => format!("stopped at {of}"),
         _ if app.is_retraining() => "retraining …".to_owned(),
+        _ if app.remade.is_some() => {
+            format!("made again: update {} of {}", app.remade.unwrap_or_default(), snapshot.recorded)
+        }
         RunState::Given => format!("given ensemble, nothing to train{}", digest(app, snapshot)),
         RunState::Playing => format!("training, {of}"),
         RunState::Paused => format!("paused at {of}{}", digest(app, snapshot)),
@@ -227,7 +231,8 @@ fn digest(app: &App, snapshot: &Snapshot) -> String {
     if snapshot.state != RunState::Given && !app.shows_controls() {
         return String::new();
     }
-    let text = snapshot.digest.map_or(String::new(), |digest| format!(", digest {digest}"));
+    let whose = if snapshot.state == RunState::Given { "digest by its file" } else { "digest" };
+    let text = snapshot.digest.map_or(String::new(), |digest| format!(", {whose} {digest}"));
     match app.promised() {
         None => text,
         Some(promised) if snapshot.digest == Some(promised) => text + ", the same as in the link",

@@ -53,6 +53,13 @@ pub struct Heatmap<'a> {
     pub color_map: usize,
 }
 
+impl Pictures {
+    /// Forgets those of panels that are gone.
+    pub fn keep_only(&mut self, panels: &[Id]) {
+        self.kept.retain(|id, _| panels.contains(id));
+    }
+}
+
 impl Heatmap<'_> {
     /// Draws into `rect`; returns the cell under the pointer, or that which arrow keys move to.
     pub fn show(self, ui: &mut Ui, rect: Rect, pictures: &mut Pictures) -> Option<usize> {

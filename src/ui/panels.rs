@@ -22,6 +22,8 @@ pub struct Panel<'a> {
     pub clone: Option<(usize, &'a [f32])>,
     /// What is said in the place of its figures until then.
     pub waiting: String,
+    /// Whether it stays the same during a run.
+    pub is_of_run: bool,
 }
 
 impl Panel<'_> {
@@ -56,6 +58,7 @@ pub fn list<'a>(started: &'a Started, snapshot: &'a Snapshot, view: &View) -> Ve
         policy: Some(policy),
         clone: None,
         waiting: String::new(),
+        is_of_run: false,
     });
     let cells = started.optimal.policy.len();
     let clones = view.clones.iter().enumerate().map(|(index, cloner)| {
@@ -68,6 +71,7 @@ pub fn list<'a>(started: &'a Started, snapshot: &'a Snapshot, view: &View) -> Ve
             policy: clone.map(|clone| &clone.view),
             clone: Some((index, contexts)),
             waiting: waiting(cloner.is_quick(cells, started.setup.config.horizon), snapshot.state),
+            is_of_run: false,
         }
     });
     let optimal = Panel {
@@ -76,6 +80,7 @@ pub fn list<'a>(started: &'a Started, snapshot: &'a Snapshot, view: &View) -> Ve
         policy: Some(&started.optimal),
         clone: None,
         waiting: String::new(),
+        is_of_run: true,
     };
     experts.chain(clones).chain(std::iter::once(optimal)).collect()
 }
@@ -180,6 +185,8 @@ pub struct Ground<'a> {
     pub grid: &'a Grid,
     /// Changes whenever a policy does.
     pub version: u64,
+    /// Changes with the run.
+    pub run_version: u64,
     /// Cells with a reward r̃ of their own.
     pub rewards: &'a [(usize, f64)],
 }
@@ -193,8 +200,10 @@ pub fn show(
     view: &View,
     pictures: &mut Pictures,
 ) -> Touched {
-    let Ground { grid, version, rewards } = *ground;
+    let Ground { grid, rewards, .. } = *ground;
     let mut touched = Touched::default();
+    let id_of = |panel: &Panel| egui::Id::unique(("heatmap", &panel.title));
+    pictures.keep_only(&panels.iter().map(id_of).collect::<Vec<_>>());
     let title = title_height(ui);
     let size = vec2(plan.picture.x, plan.picture.y + title);
     for row in panels.chunks(plan.columns) {
@@ -210,7 +219,8 @@ pub fn show(
                 ui.painter().rect_filled(picture, 4.0, Palette::of(ui).raised);
                 continue;
             };
-            let id = egui::Id::unique(("heatmap", &panel.title));
+            let id = id_of(panel);
+            let version = if panel.is_of_run { ground.run_version } else { ground.version };
             let name = describe(&panel.title, policy);
             let rewards = if panel.clone.is_some() { rewards } else { &[] };
             let View { cell: marked, color_map, .. } = *view;

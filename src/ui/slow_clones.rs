@@ -15,7 +15,13 @@ type Moment = (u32, u32);
 pub struct SlowClones {
     making: Vec<(TaskId, Moment, AttackerChoice)>,
     made: Vec<(Moment, CloneView)>,
+    /// When those that are missing are to be made, on the page's clock: once a moment has stood for a while. Who drags the
+    /// timeline would have a worker begin for each.
+    due: Option<f64>,
 }
+
+/// How long a moment stands before its slow clones are made, in seconds.
+const PAUSE: f64 = 0.3;
 
 impl SlowClones {
     /// Forgets them all, done or not.
@@ -82,7 +88,6 @@ impl App {
     /// Adds the clones that are not quick to the snapshot on the page; where it rests, those that are missing are
     /// asked for.
     pub(super) fn add_made_clones(&mut self) {
-        let slow = self.wanted_slow_clones();
         let Some(shown) = &mut self.shown else { return };
         let moment = (shown.snapshot.run, shown.snapshot.update);
         // Of moments gone by nothing is kept.
@@ -100,12 +105,28 @@ impl App {
                 shown.version = self.taken;
             }
         }
+        self.slow_clones.due = Some(self.now + PAUSE).filter(|_| self.misses_slow_clones());
+    }
+
+    /// Whether the page rests at a moment for which a clone is neither there nor being made.
+    fn misses_slow_clones(&self) -> bool {
+        let Some(shown) = &self.shown else { return false };
         let is_resting = shown.snapshot.state != RunState::Playing && self.begun.is_none();
         let is_missing = |cloner: &AttackerChoice| {
             !shown.snapshot.clones.iter().any(|clone| clone.cloner == *cloner)
                 && !self.slow_clones.making.iter().any(|(_, _, making)| making == cloner)
         };
-        if is_resting && slow.iter().any(is_missing) {
+        is_resting && self.wanted_slow_clones().iter().any(is_missing)
+    }
+
+    /// Asks for the ensemble of a moment that has stood for a while, where clones are to be made of it.
+    pub(super) fn look_after_slow_clones(&mut self, ctx: &egui::Context) {
+        let Some(due) = self.slow_clones.due else { return };
+        if self.now < due {
+            return ctx.request_repaint_after_secs((due - self.now) as f32);
+        }
+        self.slow_clones.due = None;
+        if self.misses_slow_clones() {
             self.want(Wanted::Clones);
         }
     }

@@ -22,12 +22,13 @@ pub struct Cell {
     text: String,
     value: f64,
     color: Option<Color32>,
-    hover: String,
+    /// Made when somebody points at it.
+    hover: Option<Box<dyn FnOnce(&Ui) -> String>>,
 }
 
 impl Cell {
     pub fn number(value: f64, text: String) -> Cell {
-        Cell { text, value, color: None, hover: String::new() }
+        Cell { text, value, color: None, hover: None }
     }
 
     pub fn colored(self, color: Color32) -> Cell {
@@ -35,7 +36,12 @@ impl Cell {
     }
 
     pub fn hover(self, text: &str) -> Cell {
-        Cell { hover: text.to_owned(), ..self }
+        let text = text.to_owned();
+        self.hover_with(|_| text)
+    }
+
+    pub fn hover_with(self, text: impl FnOnce(&Ui) -> String + 'static) -> Cell {
+        Cell { hover: Some(Box::new(text)), ..self }
     }
 
     pub fn suffix(mut self, text: &str) -> Cell {
@@ -87,8 +93,10 @@ pub fn table(ui: &mut Ui, id: &'static str, columns: &[Column], mut rows: Vec<Ve
                     let text = RichText::new(figure.text).small().color(figure.color.unwrap_or(palette.ink));
                     let role = if index == 0 { Role::RowHeader } else { Role::Cell };
                     let label = cell(ui, row, role, |ui| ui.add(egui::Label::new(text).extend()));
-                    if !figure.hover.is_empty() {
-                        label.on_hover_text(figure.hover);
+                    if let Some(text) = figure.hover {
+                        label.on_hover_ui(|ui| {
+                            ui.label(text(ui));
+                        });
                     }
                 }
                 ui.end_row();

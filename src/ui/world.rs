@@ -35,6 +35,8 @@ pub struct WorldTab {
     /// Worlds before the last edits, and the one that they led to.
     before: Vec<GridSpec>,
     known: Option<GridSpec>,
+    /// Whether a control that is still held down has changed the world: all that it does is one edit.
+    is_one_edit: bool,
     /// Why the last edit was not made, or not all of it.
     refusal: Option<String>,
 }
@@ -51,6 +53,8 @@ impl WorldTab {
         if self.known.as_ref() != Some(&app.setup().grid) {
             self.before.clear();
             self.known = Some(app.setup().grid.clone());
+            // Nor does a stroke go on that was begun on another world.
+            (self.draft, self.stroke, self.last) = (None, None, None);
         }
         self.show_controls(ui, app);
         let is_narrow = ui.ctx().content_rect().width() < NARROW;
@@ -139,8 +143,11 @@ impl WorldTab {
         let goal = grid.goal;
         // Only what was changed here counts: a menu above may have changed the world already.
         grid.walls.retain(|&(row, col)| row < rows && col < cols && (row, col) != goal);
+        let is_held = ui.input(|input| input.pointer.any_down());
+        self.is_one_edit &= is_held;
         if grid != old && self.stroke.is_none() {
             self.change(app, grid);
+            self.is_one_edit = is_held;
         }
     }
 
@@ -156,7 +163,9 @@ impl WorldTab {
                 self.before.clear();
             }
             self.known = Some(app.setup().grid.clone());
-            self.before.push(before);
+            if !self.is_one_edit {
+                self.before.push(before);
+            }
             if self.before.len() > MOST_UNDONE {
                 self.before.remove(0);
             }
@@ -177,6 +186,10 @@ impl WorldTab {
         );
         response.widget_info(|| WidgetInfo::labeled(Role::Button, true, &name));
         paint(ui, rect, grid);
+        if response.clicked() && response.interact_pointer_pos().is_none() {
+            // By a screen reader, which has pointed at no cell: the keys choose one.
+            response.request_focus();
+        }
         if response.has_focus() {
             paint_cursor(ui, cell_rect(rect, grid, self.cursor));
             self.listen(ui, app, &response);

@@ -2,8 +2,8 @@
 
 use egui::{RichText, Ui, vec2};
 
-use super::{Batch, choose_cloners, exports, introduce, title_of};
-use crate::ape::{Digest, EnsembleFile};
+use super::{Batch, Moment, choose_cloners, exports, introduce, is_shown, title_of, warn};
+use crate::ape::EnsembleFile;
 use crate::attack::AttackerChoice;
 use crate::experiment::{Attack, Bench, Outcome, Task, ensemble_returns};
 use crate::lab::Exported;
@@ -26,9 +26,9 @@ pub struct BenchTab {
 /// What was attacked.
 struct Subject {
     title: String,
+    moment: Moment,
     horizon: u32,
     seed: u32,
-    digest: Option<Digest>,
     ensemble: Returns,
 }
 
@@ -48,14 +48,14 @@ impl BenchTab {
         let config = &app.setup().config;
         let (horizon, seed) = (config.horizon, config.seed);
         let title = title_of(&exported, app);
-        let digest = exported.file.digest;
+        let moment = (exported.run, exported.update, exported.file.digest);
         // What the worker has said already need not be computed here: that takes a while on a large grid.
         let known = app.shown().filter(|(started, snapshot)| {
             (snapshot.run, snapshot.update, started.setup.config.horizon) == (exported.run, exported.update, horizon)
         });
         let computed = || ensemble_returns(&grid, &ensemble, horizon);
         let ensemble = known.map_or_else(computed, |(_, snapshot)| snapshot.ensemble);
-        self.subject = Some(Subject { title, horizon, seed, digest, ensemble });
+        self.subject = Some(Subject { title, moment, horizon, seed, ensemble });
         // What it came from does not matter to whoever attacks it.
         let file = Box::new(EnsembleFile { config: None, ..exported.file });
         let mut cloners = self.cloners.clone();
@@ -120,6 +120,9 @@ impl BenchTab {
             numbers::percent(r.success)
         );
         ui.label(RichText::new(text).text_style(theme::strong()));
+        if !is_shown(app, subject.moment) {
+            warn(ui, "The ensemble on the page has changed since: attack again to see it.");
+        }
         show_table(ui, &bench);
         show_learning_curve(ui, &bench, app.view.kind);
     }
@@ -131,7 +134,7 @@ impl BenchTab {
             Outcome::Attack(attack, _) => Some(attack.clone()),
             _ => None,
         });
-        let Subject { horizon, seed, digest, ensemble, .. } = *subject;
+        let Subject { moment: (.., digest), horizon, seed, ensemble, .. } = *subject;
         Some(Bench { horizon, seed, digest, ensemble, attackers: attackers.collect() })
     }
 }

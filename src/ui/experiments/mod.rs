@@ -12,11 +12,12 @@ use egui::accesskit::Live;
 use egui::cache::{ComputerMut, FrameCache};
 use egui::{ProgressBar, RichText, Ui};
 
-use super::app::App;
+use super::app::{App, PATIENCE};
 use super::numbers;
 use super::table::Cell;
 use super::theme::Palette;
 use super::widgets::heading;
+use crate::ape::Digest;
 use crate::attack::AttackerChoice;
 use crate::experiment::{Outcome, Summary, Task};
 use crate::lab::{Exported, Pool, TaskEvent, TaskId};
@@ -81,12 +82,12 @@ impl Batch {
         self.ended = Some(now);
     }
 
-    /// What several workers have gained.
-    fn speed_up(&self, workers: usize, seconds: f64) -> String {
+    /// How busy several workers were.
+    fn busy(&self, workers: usize, seconds: f64) -> String {
         if workers < 2 || self.tasks.len() < 2 || seconds < 0.5 {
             return String::new();
         }
-        format!(": {:.1} s of work by {workers} workers, {:.1} times as fast as one", self.work, self.work / seconds)
+        format!(": {:.1} s of work, {:.1} of {workers} workers busy on average", self.work, self.work / seconds)
     }
 
     /// How far it is, with an estimate and a button that cancels; in the end how long it took.
@@ -100,11 +101,14 @@ impl Batch {
         if let Some(ended) = self.ended {
             let seconds = ended - self.begun;
             let text = match self.outcomes.iter().flatten().count() {
-                _ if self.is_complete() => format!("done in {seconds:.1} s{}", self.speed_up(pool.size(), seconds)),
+                _ if self.is_complete() => format!("done in {seconds:.1} s{}", self.busy(pool.size(), seconds)),
                 count => format!("stopped after {seconds:.1} s with {count} of {} done", self.tasks.len()),
             };
             status(ui, &text, Live::Polite);
             return;
+        }
+        if pool.is_starting() && now - self.begun > PATIENCE {
+            warn(ui, "A worker does not answer. It may still be on its way; Cancel gives it up.");
         }
         ui.horizontal(|ui| {
             let seconds = now - self.begun;
@@ -146,6 +150,21 @@ fn title_of(exported: &Exported, app: &App) -> String {
     }
 }
 
+/// Run, update and digest of an ensemble.
+type Moment = (u32, u32, Option<Digest>);
+
+/// Whether the ensemble on the page is still this one.
+fn is_shown(app: &App, moment: Moment) -> bool {
+    app.shown().is_none_or(|(_, snapshot)| (snapshot.run, snapshot.update, snapshot.digest) == moment)
+}
+
+/// Says under results that they are of before.
+fn warn(ui: &mut Ui, text: &str) {
+    ui.label(RichText::new(text).small().color(Palette::of(ui).warning));
+}
+
+const OTHER_SETTINGS: &str = "Made with other settings than those at the side now.";
+
 /// Which of the cloners take part.
 fn choose_cloners(ui: &mut Ui, chosen: &mut Vec<AttackerChoice>) {
     ui.horizontal_wrapped(|ui| {
@@ -181,15 +200,20 @@ fn introduce(ui: &mut Ui, title: &str, text: &str) {
 }
 
 /// A figure over seeds, as mean ± standard deviation; its interval is in the hint.
-fn summary_cell(ui: &Ui, summary: &Summary, is_steps: bool) -> Cell {
-    let number = |value: f64| if is_steps { numbers::short(value) } else { numbers::percent(value) };
+fn summary_cell(summary: &Summary, is_steps: bool) -> Cell {
+    let number = move |value: f64| if is_steps { numbers::short(value) } else { numbers::percent(value) };
     let Summary { mean, sd, ref values } = *summary;
     let seeds = values.len();
-    let (low, high) = interval(ui, summary);
     let spread = if is_steps { numbers::short(sd) } else { format!("{:.0} %", 100.0 * sd) };
     let text = if seeds > 1 { format!("{} ± {spread}", number(mean)) } else { number(mean) };
-    let hint = format!("95 % bootstrap interval {} to {}, {seeds} seeds", number(low), number(high));
-    Cell::number(mean, text).hover(&hint)
+    let summary = summary.clone();
+    Cell::number(mean, text).hover_with(move |ui| {
+        if seeds == 1 {
+            return "One seed".to_owned();
+        }
+        let (low, high) = interval(ui, &summary);
+        format!("95 % bootstrap interval {} to {}, {seeds} seeds", number(low), number(high))
+    })
 }
 
 /// The interval of a summary, made once for as long as it is shown.

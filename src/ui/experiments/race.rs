@@ -9,7 +9,7 @@ use std::rc::Rc;
 use egui::{Button, ComboBox, Label, RichText, Slider, Ui, vec2};
 
 use self::board::Board;
-use super::{Batch, introduce, title_of};
+use super::{Batch, Moment, introduce, is_shown, title_of, warn};
 use crate::ape::EnsembleFile;
 use crate::attack::AttackerChoice;
 use crate::experiment::{Outcome, Race, Raced, Racer, Task};
@@ -47,8 +47,8 @@ pub struct RaceTab {
 /// What was raced.
 #[derive(Clone, PartialEq)]
 struct Subject {
-    /// Run and update of the ensemble.
-    moment: (u32, u32),
+    /// Run and update of the ensemble, and its digest: runs of another session have the same numbers.
+    moment: Moment,
     title: String,
     cloner: AttackerChoice,
     expert: Option<u32>,
@@ -109,7 +109,7 @@ impl RaceTab {
         let config = &app.setup().config;
         let expert = self.expert.filter(|&expert| (expert as usize) < exported.file.experts.len());
         let subject = Subject {
-            moment: (exported.run, exported.update),
+            moment: (exported.run, exported.update, exported.file.digest),
             title: title_of(&exported, app),
             cloner: self.cloner(app),
             expert,
@@ -439,10 +439,8 @@ impl RaceTab {
         ui.label(small(format!(
             "{what}; lost: not there by T = {horizon}. {cloner} clone, from row {row}, column {col}, {title}."
         )));
-        let is_old = app.shown().is_some_and(|(_, snapshot)| (snapshot.run, snapshot.update) != *moment);
-        if is_old {
-            let text = "The ensemble on the page has changed since: race again to see it.";
-            ui.label(RichText::new(text).small().color(palette.warning));
+        if !is_shown(app, *moment) {
+            warn(ui, "The ensemble on the page has changed since: race again to see it.");
         }
     }
 

@@ -2,8 +2,9 @@
 
 use egui::{DragValue, RichText, TextEdit, Ui, vec2};
 
-use super::{Batch, exports, introduce, paper_cell, summary_cell};
-use crate::experiment::{Outcome, Summary, Sweep, SweepPoint, Task};
+use super::{Batch, OTHER_SETTINGS, exports, introduce, paper_cell, summary_cell, warn};
+use crate::ape::Config;
+use crate::experiment::{Outcome, Setup, Summary, Sweep, SweepPoint, Task};
 use crate::mdp::RETURN_KINDS;
 use crate::ui::app::App;
 use crate::ui::chart::{self, Axes, Curve, Style};
@@ -19,20 +20,13 @@ pub struct SweepTab {
     is_pareto: bool,
     pub batch: Option<Batch>,
     refusal: Option<String>,
-    /// Whether the paper's figures are of the same setting.
-    is_papers: bool,
+    /// What the batch was made with.
+    of: Option<Setup>,
 }
 
 impl Default for SweepTab {
     fn default() -> Self {
-        SweepTab {
-            betas: "0:1:0.1".to_owned(),
-            seeds: 3,
-            is_pareto: false,
-            batch: None,
-            refusal: None,
-            is_papers: false,
-        }
+        SweepTab { betas: "0:1:0.1".to_owned(), seeds: 3, is_pareto: false, batch: None, refusal: None, of: None }
     }
 }
 
@@ -92,15 +86,19 @@ impl SweepTab {
             (true, "Pareto", "Return of the clone over that of the ensemble, a point for each β"),
         ];
         choose(ui, "Picture", &mut self.is_pareto, &options);
-        if points.is_empty() {
+        if points.iter().any(|point| point.clone.is_none()) {
             let text = "This return is not known of a clone that remembers: choose within T or success.";
             ui.label(RichText::new(text).color(palette.warning));
-        } else if self.is_pareto {
+        }
+        if self.is_pareto {
             show_pareto(ui, &points, kind)
         } else {
             show_over_beta(ui, &points, kind)
         }
-        show_table(ui, &sweep, kind, self.is_papers);
+        if self.of != Some(settings(app.setup())) {
+            warn(ui, OTHER_SETTINGS);
+        }
+        show_table(ui, &sweep, kind, self.of.as_ref().is_some_and(Setup::is_papers));
     }
 
     fn begin(&mut self, app: &mut App, now: f64) {
@@ -112,7 +110,7 @@ impl SweepTab {
                     batch.cancel(&mut app.pool, now);
                 }
                 let setup = app.setup();
-                self.is_papers = setup.is_papers();
+                self.of = Some(settings(setup));
                 let task = |setup| Task::Sweep { setup: Box::new(setup) };
                 let tasks = Sweep::setups(setup, &betas, self.seeds).into_iter().map(task).collect();
                 self.batch = Some(Batch::begin(&mut app.pool, tasks, now));
@@ -144,32 +142,38 @@ impl SweepTab {
     }
 }
 
+/// What a sweep depends on: its β and seeds are its own.
+fn settings(setup: &Setup) -> Setup {
+    let config = Config { beta: 0.0, seed: 0, ..setup.config.clone() };
+    Setup { grid: setup.grid.clone(), config, ..Setup::default() }
+}
+
 fn show_over_beta(ui: &mut Ui, points: &[SweepPoint], kind: usize) {
     let palette = Palette::of(ui);
-    let curve = |name: &str, color, of: fn(&SweepPoint) -> &Summary| Curve {
+    let curve = |name: &str, color, of: fn(&SweepPoint) -> Option<&Summary>| Curve {
         name: name.to_owned(),
         color,
-        points: points.iter().map(|point| [point.beta, of(point).mean]).collect(),
+        points: points.iter().filter_map(|point| Some([point.beta, of(point)?.mean])).collect(),
         style: Style::Marked,
     };
     let curves = vec![
-        curve("ensemble", palette.accent, |point| &point.ensemble),
-        curve("clone", palette.clone, |point| &point.clone),
-        curve("occupancy clone", palette.warning, |point| &point.occupancy),
+        curve("ensemble", palette.accent, |point| Some(&point.ensemble)),
+        curve("clone", palette.clone, |point| point.clone.as_ref()),
+        curve("occupancy clone", palette.warning, |point| point.occupancy.as_ref()),
     ];
     draw(ui, kind, "Over β", curves, Vec::new(), |beta| numbers::decimal(beta, 2));
 }
 
 fn show_pareto(ui: &mut Ui, points: &[SweepPoint], kind: usize) {
     let palette = Palette::of(ui);
-    let at = |point: &SweepPoint| [point.ensemble.mean, point.clone.mean];
+    let at = |point: &SweepPoint| Some([point.ensemble.mean, point.clone.as_ref()?.mean]);
     let curves = vec![Curve {
         name: "clone over ensemble".to_owned(),
         color: palette.clone,
-        points: points.iter().map(at).collect(),
+        points: points.iter().filter_map(at).collect(),
         style: Style::Marked,
     }];
-    let labels = points.iter().map(|point| (at(point), format!(" β = {}", point.beta))).collect();
+    let labels = points.iter().filter_map(|point| Some((at(point)?, format!(" β = {}", point.beta)))).collect();
     draw(ui, kind, "Pareto", curves, labels, chart::in_steps);
 }
 
@@ -200,13 +204,16 @@ fn show_table(ui: &mut Ui, sweep: &Sweep, kind: usize, is_papers: bool) {
         Column::new("paper: clone, uncapped", "The same table; only hitting times without a cut can be so long"),
     ];
     let is_steps = RETURN_KINDS[kind].is_steps;
+    let known = |summary: Option<&Summary>| {
+        summary.map_or_else(|| Cell::number(f64::NEG_INFINITY, "–".to_owned()), |of| summary_cell(of, is_steps))
+    };
     let rows = sweep.points(kind).into_iter().map(|point| {
         let paper = Sweep::PAPER.iter().find(|(beta, _)| is_papers && *beta == point.beta);
         vec![
             Cell::number(point.beta, point.beta.to_string()),
-            summary_cell(ui, &point.ensemble, is_steps),
-            summary_cell(ui, &point.clone, is_steps),
-            summary_cell(ui, &point.occupancy, is_steps),
+            summary_cell(&point.ensemble, is_steps),
+            known(point.clone.as_ref()),
+            known(point.occupancy.as_ref()),
             paper_cell(paper.map(|(_, paper)| paper.ensemble), palette),
             paper_cell(paper.map(|(_, paper)| paper.clone), palette),
         ]

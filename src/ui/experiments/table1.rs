@@ -2,9 +2,10 @@
 
 use egui::{DragValue, RichText, Ui};
 
-use super::{Batch, choose_cloners, exports, introduce, paper_cell, summary_cell};
+use super::{Batch, OTHER_SETTINGS, choose_cloners, exports, introduce, paper_cell, summary_cell, warn};
+use crate::ape::Config;
 use crate::attack::AttackerChoice;
-use crate::experiment::{METHODS, Outcome, Table1, Task};
+use crate::experiment::{METHODS, Outcome, Setup, Table1, Task};
 use crate::mdp::RETURN_KINDS;
 use crate::ui::app::App;
 use crate::ui::table::{Cell, Column, table};
@@ -17,13 +18,13 @@ pub struct Table1Tab {
     /// The cloners of the batch.
     columns: Vec<AttackerChoice>,
     pub batch: Option<Batch>,
-    /// Whether the paper's figures are of the same setting.
-    is_papers: bool,
+    /// What the batch was made with.
+    of: Option<Setup>,
 }
 
 impl Default for Table1Tab {
     fn default() -> Self {
-        Table1Tab { cloners: AttackerChoice::usual(), seeds: 5, columns: Vec::new(), batch: None, is_papers: false }
+        Table1Tab { cloners: AttackerChoice::usual(), seeds: 5, columns: Vec::new(), batch: None, of: None }
     }
 }
 
@@ -43,7 +44,7 @@ impl Table1Tab {
             let is_running = self.batch.as_ref().is_some_and(Batch::is_running);
             if ui.add_enabled(!is_running, egui::Button::new("Make Table 1")).clicked() {
                 let setup = app.setup();
-                self.is_papers = setup.is_papers_table();
+                self.of = Some(settings(setup));
                 self.columns = self.cloners.clone();
                 let task = |setup| Task::Table1 { setup: Box::new(setup), attackers: self.columns.clone() };
                 let tasks = Table1::setups(setup, self.seeds).into_iter().map(task).collect();
@@ -66,7 +67,11 @@ impl Table1Tab {
             return;
         }
         ui.add_space(4.0);
-        show_table(ui, &made, app.view.kind, self.is_papers);
+        let is_papers = self.of.as_ref().is_some_and(Setup::is_papers_table);
+        if self.of != Some(settings(app.setup())) {
+            warn(ui, OTHER_SETTINGS);
+        }
+        show_table(ui, &made, app.view.kind, is_papers);
     }
 
     /// What has come so far.
@@ -79,6 +84,12 @@ impl Table1Tab {
         }
         made
     }
+}
+
+/// What a table depends on: its seeds are its own, and β is that of the start.
+fn settings(setup: &Setup) -> Setup {
+    let config = Config { seed: 0, ..setup.config.clone() };
+    Setup { grid: setup.grid.clone(), config, ..Setup::default() }
 }
 
 fn show_table(ui: &mut Ui, made: &Table1, kind: usize, is_papers: bool) {
@@ -99,19 +110,19 @@ fn show_table(ui: &mut Ui, made: &Table1, kind: usize, is_papers: bool) {
         let paper = method.paper.as_ref().filter(|_| is_papers);
         let mut cells = vec![
             Cell::number(row.method as f64, method.title.to_owned()).hover(method.summary),
-            summary_cell(ui, &row.ensemble, is_steps),
+            summary_cell(&row.ensemble, is_steps),
         ];
         cells.push(paper_cell(paper.map(|paper| paper.ensemble), palette));
         cells.push(paper_cell(paper.map(|paper| paper.clone), palette));
         for (clone, within) in row.clones.iter().zip(&within.clones) {
             cells.push(match (clone, within) {
                 (Some(clone), _) => {
-                    let cell = summary_cell(ui, clone, is_steps);
+                    let cell = summary_cell(clone, is_steps);
                     let is_lost = is_steps && clone.mean < row.ensemble.mean - 5.0;
                     if is_lost { cell.colored(palette.clone) } else { cell }
                 }
                 (None, Some(within)) => {
-                    let cell = summary_cell(ui, within, true).suffix(" in T");
+                    let cell = summary_cell(within, true).suffix(" in T");
                     cell.hover("A clone with a memory has no hitting times to cap: its return within T stands here.")
                 }
                 (None, None) => Cell::number(f64::NEG_INFINITY, "–".to_owned()),

@@ -68,9 +68,12 @@ impl Board<'_> {
             ui.ctx().set_cursor_icon(CursorIcon::PointingHand);
         }
         self.paint(ui, rect, cell, pointed.filter(|_| response.hovered()));
-        if response.clicked() && pointed.is_some() {
+        if response.clicked() {
             response.request_focus();
-            return pointed;
+            // A screen reader has pointed at no cell: the keys choose one.
+            if pointed.is_some() {
+                return pointed;
+            }
         }
         if !response.has_focus() {
             return None;
