@@ -1,6 +1,6 @@
 // How fast the built page is in headless Chromium, against its goals: `cargo xtask bench browser` runs it. Progress goes to
 // stderr; the last line of stdout is one JSON document of rows. MINUTES: how long the page is played with for its memory.
-// ONLY: a part by name (training, frames, weight, opening, table1, memory, idle).
+// ONLY: a part by name (training, frames, weight, opening, table1, pool, memory, idle).
 import { readFile, readdir } from "node:fs/promises";
 import { cpus } from "node:os";
 import { join } from "node:path";
@@ -10,7 +10,7 @@ import { click, press, status, trained, until, widget } from "./visitor.mjs";
 
 const MINUTES = Number(process.env.MINUTES ?? 1);
 /** A run of the default setting that does not end while it is looked at. */
-const LONG_RUN = "#v=1&total_steps=4000000000&speed=max";
+const LONG_RUN = "#v=1&updates=10000000&speed=max";
 const FLAT_OUT = "#v=1&speed=max";
 
 const rows = [];
@@ -122,14 +122,15 @@ async function training(browser, site) {
   });
   const what = "The time of training that the page shows (updates alone, without the points of the curve) once the default run (732 updates, seed 1, β 0.6) has been trained";
   row("default training run in the browser's worker", "ms", 45, "median", alone.slice(2), what + ", the page at rest meanwhile.");
-  row("the same while the page draws that β has moved", "ms", null, "median", beside, what + ": Chromium's drawing in software takes its part of the same cores.");
+  row("the same while the page draws that β has moved", "ms", 45, "median", beside, what + ": Chromium's drawing in software takes its part of the same cores.");
   row("β moved → every panel shows the retrained result", "ms", 100, "p95", times.slice(4), "From the time stamp of a pressed arrow key to the end of the frame that drew the trained result, which the screen shows at its next turn; four moves to warm up.");
 }
 
-/** Frames of a trace: what the page's main thread did in each, its handlers of messages and events before it included. */
+/** Frames of a trace: what the page's main thread did in each, handlers of messages and events and the layout before it included. */
 function frames(events) {
   const frame = events.find((event) => event.name === "FireAnimationFrame");
-  const kinds = ["FireAnimationFrame", "FunctionCall", "EventDispatch"];
+  // Scripts, and what the browser makes of the elements that they have changed.
+  const kinds = ["FireAnimationFrame", "FunctionCall", "EventDispatch", "UpdateLayoutTree", "Layout", "PrePaint", "Paint", "Layerize", "Commit"];
   const own = events.filter((e) => e.pid === frame.pid && e.tid === frame.tid && e.ph === "X" && kinds.includes(e.name));
   own.sort((a, b) => a.ts - b.ts || b.dur - a.dur);
   let [end, work, elapsed] = [0, 0, 0];
@@ -152,16 +153,19 @@ async function flatOut(browser, site) {
   const { page, close } = await open(browser, site.address + LONG_RUN, { before: measured });
   await until(() => status(page).textContent(), (text) => /^training, update \d{4,}/.test(text));
   await wait(2000);
+  await forget(page);
   await page.evaluate(() => (window.bench.bytes = []));
   await browser.startTracing(page, { categories: ["devtools.timeline"] });
   await wait(20_000);
   const { traceEvents } = JSON.parse((await browser.stopTracing()).toString());
   const found = frames(traceEvents).slice(1);
   const work = found.map((frame) => frame.work);
-  const how = "Train tab, 1280 × 800, 20 s, from a trace: time that the main thread ran in an animation frame, with the handlers of messages before it";
+  const how = "Train tab, 1280 × 800, 20 s, from a trace: time that the main thread ran for an animation frame, with handlers of messages, style, layout and paint";
   row("main-thread work per frame while training flat out", "ms", 8, "p95", work, how + ".");
   row("the longest frame of these", "ms", 16, "max", work, how + ".");
   row("the same with the time that others had its core", "ms", null, "p95", found.map((frame) => frame.elapsed), "As above, by the clock on the wall: the training worker and Chromium's drawing in software share this machine's cores.");
+  const measures = await page.evaluate(() => performance.getEntriesByName("ape-lab: frame").map((frame) => frame.duration));
+  row("the same as the page measures it", "ms", null, "p95", measures, "The page's own entries (User Timing): its callback alone, by the clock on the wall.");
   const bytes = await page.evaluate(() => window.bench.bytes);
   row("a snapshot on its way to the page", "kB", null, "median", bytes.map((bytes) => bytes / 1000), "Bytes of a message of the worker, two experts and two clones on the grid of 10 × 10.");
   await close();
@@ -239,6 +243,31 @@ async function table1(browser, site) {
   await close();
 }
 
+/** How many times sooner all workers are done with a sweep than one. */
+async function pool(browser, site) {
+  const times = new Map([[1, []], [cpus().length, []]]);
+  const swept = async (cores) => {
+    const before = (page) => page.addInitScript((cores) => Object.defineProperty(navigator, "hardwareConcurrency", { value: cores }), cores);
+    const { page, close } = await open(browser, site.address + FLAT_OUT, { before });
+    await trained(page);
+    await click(page, "radio", "Tab: β sweep");
+    const seeds = widget(page, "spinbutton", "Seeds of the sweep");
+    await seeds.waitFor();
+    const done = page.getByRole("status").filter({ hasText: /^done in/ });
+    // The first has its workers still to start.
+    for (let time = 0; time < 2; time++) {
+      await click(page, "button", "Sweep");
+      await page.getByRole("progressbar", { name: "Progress" }).waitFor();
+      await done.waitFor({ timeout: 600_000 });
+    }
+    times.get(cores).push(Number((await done.textContent()).match(/done in ([\d.]+) s/)[1]));
+    await close();
+  };
+  for (let time = 0; time < 5; time++) for (const cores of times.keys()) await swept(cores);
+  const [one, all] = [...times.values()];
+  row("A sweep by all workers, compared with one", "×", null, "median", one.map((one, time) => one / all[time]), `11 values of β, 3 seeds, on ${cpus().length} cores; the times that the page shows (one worker: median ${figures.median([...one].sort((a, b) => a - b))} s), five times one after the other.`);
+}
+
 /** The line through points (x, y): how much y grows for each x. */
 function slope(points) {
   const mean = (k) => points.reduce((sum, point) => sum + point[k], 0) / points.length;
@@ -313,7 +342,7 @@ async function idle(browser, site) {
   await close();
 }
 
-const parts = { training, frames: flatOut, weight, opening, table1, memory, idle };
+const parts = { training, frames: flatOut, weight, opening, table1, pool, memory, idle };
 const chosen = process.env.ONLY?.split(",") ?? Object.keys(parts);
 const site = await serve();
 const environment = { node: process.version, cpu: cpus()[0].model, cores: cpus().length };

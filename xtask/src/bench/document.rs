@@ -200,7 +200,7 @@ fn figures(read: Read) -> String {
     let native = read("native")
         .into_iter()
         .flat_map(|part| LINES.iter().filter_map(|line| native_line(line, &part)).collect::<Vec<_>>());
-    let browser = rows("browser").into_iter().filter_map(|row| browser_line(&row));
+    let browser = rows("browser").into_iter().filter_map(|row| browser_line(&row)).chain(compared(read));
     let peers = rows("peers").into_iter().filter_map(|row| peer_line(&row));
     let cells = |shown: Shown| {
         let Shown { part, what, figure, shortest, spread, note, goal: (goal, met) } = shown;
@@ -273,6 +273,17 @@ fn browser_line(row: &Value) -> Option<Shown> {
     };
     let figure = format!("{} {unit}{figure}", grouped(value));
     Some(Shown { part: "browser", what: text("name"), figure, shortest, spread, note: text("note"), goal: (goal, met) })
+}
+
+/// The worker's training as so many times that of the part `native`.
+fn compared(read: Read) -> Option<Shown> {
+    const MOST: f64 = 1.5;
+    let value = |part: &str, name: &str| read(part).and_then(|part| row(&part, name)?["value"].as_f64());
+    let ratio = value("browser", "default training run in the browser's worker")? * 1e6 / value("native", DEFAULT)?;
+    let note = "The default run in the browser's worker, the page at rest, and the default run natively.".to_owned();
+    let what = "the worker, compared with native".to_owned();
+    let goal = judged(Goal::AtMost(MOST), ratio, "×", f64::NAN);
+    Some(Shown { part: "browser", what, figure: format!("{} ×", grouped(ratio)), note, goal, ..Shown::default() })
 }
 
 fn peer_line(row: &Value) -> Option<Shown> {
