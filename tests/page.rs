@@ -901,7 +901,7 @@ fn a_run_that_is_made_again_says_how_far_it_is() {
     here.0.borrow_mut().hangs = true;
     page.run_steps(2);
     page.get_by(|node| {
-        node.role() == Role::Status && says(node).is_some_and(|text| text == "made again: update 300 of 732")
+        node.role() == Role::Status && says(node).is_some_and(|text| text == "made again: 300 of 732 updates")
     });
     here.0.borrow_mut().hangs = false;
     settle(&mut page);

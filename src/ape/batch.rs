@@ -42,8 +42,8 @@ pub struct Course {
     experts: usize,
     slip: Draw<1>,
     is_slippery: bool,
-    /// Where a walker's clock is when its time is over.
-    end: u32,
+    /// The time of an episode, in ticks.
+    horizon: u32,
 }
 
 /// What a walker meets at a state, in a context.
@@ -73,7 +73,7 @@ impl Course {
             experts,
             slip: Draw::new(&[1.0 - grid.slip(), grid.slip()]),
             is_slippery: grid.slip() > 0.0,
-            end: horizon * Step::TICK,
+            horizon: horizon * Step::TICK,
         }
     }
 
@@ -85,14 +85,16 @@ impl Course {
         }
     }
 
-    /// Where an episode begins, and which expert is drawn for it. Not often, so it is kept out of the way.
+    /// Where an episode begins at this time, and which expert is drawn for it. Not often, so it is kept out of the way.
     #[cold]
     #[inline(never)]
-    fn start<P: Player>(&self, starts: &mut Starts<impl Rng>) -> Walker {
+    fn start<P: Player>(&self, walker: usize, now: u32, starts: &mut Starts<impl Rng>) -> Walker {
         starts.drawn = starts.drawn.wrapping_add(1);
         let drawn = one_of(self.starts.len() * self.experts, starts.rng.next_u32());
         let first = self.starts[drawn / self.experts] as usize;
-        Walker { at: if P::DRAWS { first } else { first + drawn % self.experts }, clock: 0 }
+        let at = if P::DRAWS { first } else { first + drawn % self.experts };
+        (starts.began[walker], starts.ends[walker]) = (now, now.wrapping_add(self.horizon));
+        Walker { at }
     }
 }
 
@@ -108,6 +110,10 @@ pub struct Luck<R> {
 struct Starts<R> {
     rng: R,
     drawn: u32,
+    /// When each walker's episode began, and when its time is over, on the clock of all: in ticks, which go round. They do
+    /// not change with a step, and stay here to leave registers to what does.
+    began: [u32; WALKERS],
+    ends: [u32; WALKERS],
 }
 
 impl Luck<Xoshiro256PlusPlus> {
@@ -116,7 +122,7 @@ impl Luck<Xoshiro256PlusPlus> {
         let mut rng = steps.clone();
         // 2¹²⁸ draws ahead.
         rng.jump();
-        Luck { steps, starts: Starts { rng, drawn: 0 } }
+        Luck { steps, starts: Starts { rng, drawn: 0, began: [0; WALKERS], ends: [0; WALKERS] } }
     }
 }
 
@@ -185,23 +191,47 @@ impl Player for Known {
 struct Walker {
     /// A pair of its state: that of the expert drawn for the episode, or the first where experts are drawn anew.
     at: usize,
-    /// Steps of its episode so far, in ticks.
-    clock: u32,
 }
 
 impl Walker {
-    /// One step; after an episode's last, a new one begins.
+    /// One that has no episode yet.
+    const IDLE: Walker = Walker { at: Course::GOAL as usize };
+
+    /// Whether it has no episode, or its episode has ended.
+    #[inline(always)]
+    fn is_idle<R>(&self, walker: usize, now: u32, course: &Course, starts: &Starts<R>) -> bool {
+        self.at >= course.pairs.len() || now == starts.ends[walker]
+    }
+
+    /// Begins a new episode, where that is due.
+    fn begin<P: Player>(&mut self, walker: usize, now: u32, course: &Course, starts: &mut Starts<impl Rng>) {
+        if self.is_idle(walker, now, course, starts) {
+            *self = course.start::<P>(walker, now, starts);
+        }
+    }
+
+    /// One step; after an episode's last, it is the first of a new one.
     #[inline(always)]
     fn step<const SLIPS: bool, P: Player>(
         &mut self,
+        walker: usize,
+        now: u32,
         course: &Course,
         player: &P,
         bits: u64,
         steps: &mut impl Rng,
         starts: &mut Starts<impl Rng>,
     ) -> Step {
+        // That there is such a pair is asked once: there is none for the goal.
+        let here = match course.pairs.get(self.at) {
+            Some(here) if now != starts.ends[walker] => here,
+            _ => {
+                *self = course.start::<P>(walker, now, starts);
+                &course.pairs[self.at]
+            }
+        };
         let pair = player.pair(self.at, (bits >> 32) as u32);
-        let passed = course.pairs[pair].action.passed(bits as u32);
+        let passed = if P::DRAWS { &course.pairs[pair] } else { here }.action.passed(bits as u32);
         let action = ActionDraw::after(passed);
         let mut executed = passed;
         if SLIPS {
@@ -209,14 +239,8 @@ impl Walker {
             let other = (1 << one_of(ACTIONS, bits as u32)) - 1;
             executed = if course.slip.outcome((bits >> 32) as u32) == 1 { other } else { passed };
         }
-        let step = Step((pair * ACTIONS + action) as u32 + self.clock);
-        let next = course.pairs[self.at].next[executed % ActionDraw::SETS];
-        self.at = usize::from(next);
-        self.clock += Step::TICK;
-        if (next == Course::GOAL) | (self.clock == course.end) {
-            *self = course.start::<P>(starts);
-        }
-        step
+        self.at = usize::from(here.next[executed % ActionDraw::SETS]);
+        Step((pair * ACTIONS + action) as u32 + now.wrapping_sub(starts.began[walker]))
     }
 }
 
@@ -254,32 +278,39 @@ impl Batch {
         wanted: u32,
         luck: &mut Luck<impl Rng + Clone>,
     ) {
-        let is_much = wanted / WALKERS as u32 >= course.end / Step::TICK;
+        let is_much = wanted / WALKERS as u32 >= course.horizon / Step::TICK;
         let rounds = if is_much { wanted.div_ceil(WALKERS as u32) as usize } else { 0 };
         self.rows.resize(rounds, [Step::default(); WALKERS]);
         let before = luck.starts.drawn;
-        let [mut a, mut b, mut c, mut d] = [(); WALKERS].map(|()| course.start::<P>(&mut luck.starts));
+        let [mut a, mut b, mut c, mut d] = [Walker::IDLE; WALKERS];
+        let mut now = 0u32;
         // A copy close at hand, which stays in registers.
         let mut steps = luck.steps.clone();
         for row in &mut self.rows {
             let bits = steps.next_u64();
-            row[0] = a.step::<SLIPS, P>(course, player, bits, &mut steps, &mut luck.starts);
+            row[0] = a.step::<SLIPS, P>(0, now, course, player, bits, &mut steps, &mut luck.starts);
             // Of 64 bits, two walkers take a half each where that is enough.
             let bits = if P::DRAWS { steps.next_u64() } else { bits >> 32 };
-            row[1] = b.step::<SLIPS, P>(course, player, bits, &mut steps, &mut luck.starts);
+            row[1] = b.step::<SLIPS, P>(1, now, course, player, bits, &mut steps, &mut luck.starts);
             let bits = steps.next_u64();
-            row[2] = c.step::<SLIPS, P>(course, player, bits, &mut steps, &mut luck.starts);
+            row[2] = c.step::<SLIPS, P>(2, now, course, player, bits, &mut steps, &mut luck.starts);
             let bits = if P::DRAWS { steps.next_u64() } else { bits >> 32 };
-            row[3] = d.step::<SLIPS, P>(course, player, bits, &mut steps, &mut luck.starts);
+            row[3] = d.step::<SLIPS, P>(3, now, course, player, bits, &mut steps, &mut luck.starts);
+            now = now.wrapping_add(Step::TICK);
         }
         luck.steps = steps;
         let mut played = WALKERS * rounds;
-        for (mut walker, tail) in [a, b, c, d].into_iter().zip(&mut self.tails) {
+        let mut walkers = [a, b, c, d];
+        walkers.iter_mut().enumerate().for_each(|(i, walker)| walker.begin::<P>(i, now, course, &mut luck.starts));
+        for (i, (walker, tail)) in walkers.iter_mut().zip(&mut self.tails).enumerate() {
             tail.clear();
-            while walker.clock > 0 || played < wanted as usize {
+            let mut now = now;
+            while luck.starts.began[i] != now || played < wanted as usize {
                 let bits = luck.steps.next_u64();
-                tail.push(walker.step::<SLIPS, P>(course, player, bits, &mut luck.steps, &mut luck.starts));
+                tail.push(walker.step::<SLIPS, P>(i, now, course, player, bits, &mut luck.steps, &mut luck.starts));
+                now = now.wrapping_add(Step::TICK);
                 played += 1;
+                walker.begin::<P>(i, now, course, &mut luck.starts);
             }
         }
         // In the end each stands at a start that was drawn in vain.
@@ -298,21 +329,25 @@ impl Batch {
         self.tails.iter_mut().for_each(Vec::clear);
         let before = luck.starts.drawn;
         let tail = &mut self.tails[0];
-        let mut walker = course.start::<Known>(&mut luck.starts);
-        while walker.clock > 0 || tail.len() < wanted as usize {
-            if walker.clock == 0 {
+        let mut walker = Walker::IDLE;
+        let mut now = 0u32;
+        walker.begin::<Known>(0, now, course, &mut luck.starts);
+        while luck.starts.began[0] != now || tail.len() < wanted as usize {
+            if luck.starts.began[0] == now {
                 player.begin();
             }
             let state = walker.at / course.experts;
             let bits = luck.steps.next_u64();
             let known = Known(player.context(state, (bits >> 32) as u32));
             let step = if course.is_slippery {
-                walker.step::<true, _>(course, &known, bits, &mut luck.steps, &mut luck.starts)
+                walker.step::<true, _>(0, now, course, &known, bits, &mut luck.steps, &mut luck.starts)
             } else {
-                walker.step::<false, _>(course, &known, bits, &mut luck.steps, &mut luck.starts)
+                walker.step::<false, _>(0, now, course, &known, bits, &mut luck.steps, &mut luck.starts)
             };
             player.acted(state, step.entry() % ACTIONS);
+            now = now.wrapping_add(Step::TICK);
             tail.push(step);
+            walker.begin::<Known>(0, now, course, &mut luck.starts);
         }
         self.episodes = luck.starts.drawn.wrapping_sub(before) - 1;
     }

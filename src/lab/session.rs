@@ -108,8 +108,8 @@ struct Resuming {
     is_playing: bool,
     /// Whether all that had been made is there again.
     is_complete: bool,
-    /// When it is told next how far it is.
-    next_news: f64,
+    /// When it is told next how far it is: not at all where it is there in a moment.
+    next_news: Option<f64>,
 }
 
 impl Session {
@@ -164,7 +164,7 @@ impl Session {
                 resumed.is_playing &= recorded > 0;
                 self.put(resumed);
                 self.runs = run;
-                self.resuming = Some(Resuming { update, is_playing, is_complete: false, next_news: 0.0 });
+                self.resuming = Some(Resuming { update, is_playing, is_complete: false, next_news: None });
             }
             Command::Retrain { beta } => {
                 let is_resuming = self.resuming.is_some();
@@ -360,10 +360,13 @@ impl Session {
     /// How far a run that is made again is, four times a second: it may take minutes.
     fn tell_remade(&mut self, now: f64) {
         let Some(run) = self.run.as_ref().filter(|run| run.is_playing) else { return };
-        if let Some(resuming) = self.resuming.as_mut().filter(|resuming| now >= resuming.next_news) {
-            resuming.next_news = now + 250.0;
+        let Some(resuming) = &mut self.resuming else { return };
+        if resuming.next_news.is_some_and(|then| now >= then) {
             self.outbox.push(Event::Remade(run.trainer().updates()));
+        } else if resuming.next_news.is_some() {
+            return;
         }
+        resuming.next_news = Some(now + 250.0);
     }
 
     /// Does what had to wait, up to what has to wait again.

@@ -214,7 +214,7 @@ fn progress(app: &App) -> String {
         _ if !app.is_session_alive() => format!("stopped at {of}"),
         _ if app.is_retraining() => "retraining …".to_owned(),
         _ if app.remade.is_some() => {
-            format!("made again: update {} of {}", app.remade.unwrap_or_default(), snapshot.recorded)
+            format!("made again: {} of {} updates", app.remade.unwrap_or_default(), snapshot.recorded)
         }
         RunState::Given => format!("given ensemble, nothing to train{}", digest(app, snapshot)),
         RunState::Playing => format!("training, {of}"),
