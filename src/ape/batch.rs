@@ -88,13 +88,12 @@ impl Course {
     /// Where an episode begins at this time, and which expert is drawn for it. Not often, so it is kept out of the way.
     #[cold]
     #[inline(never)]
-    fn start<P: Player>(&self, walker: usize, now: u32, starts: &mut Starts<impl Rng>) -> Walker {
+    fn start<P: Player>(&self, walker: usize, now: u32, starts: &mut Starts<impl Rng>) -> usize {
         starts.drawn = starts.drawn.wrapping_add(1);
         let drawn = one_of(self.starts.len() * self.experts, starts.rng.next_u32());
         let first = self.starts[drawn / self.experts] as usize;
-        let at = if P::DRAWS { first } else { first + drawn % self.experts };
         (starts.began[walker], starts.ends[walker]) = (now, now.wrapping_add(self.horizon));
-        Walker { at }
+        if P::DRAWS { first } else { first + drawn % self.experts }
     }
 }
 
@@ -189,24 +188,28 @@ impl Player for Known {
 /// A walker under way.
 #[derive(Clone, Copy)]
 struct Walker {
+    /// Its place among all.
+    number: usize,
     /// A pair of its state: that of the expert drawn for the episode, or the first where experts are drawn anew.
     at: usize,
 }
 
 impl Walker {
     /// One that has no episode yet.
-    const IDLE: Walker = Walker { at: Course::GOAL as usize };
+    fn new(number: usize) -> Walker {
+        Walker { number, at: Course::GOAL.into() }
+    }
 
     /// Whether it has no episode, or its episode has ended.
     #[inline(always)]
-    fn is_idle<R>(&self, walker: usize, now: u32, course: &Course, starts: &Starts<R>) -> bool {
-        self.at >= course.pairs.len() || now == starts.ends[walker]
+    fn is_idle<R>(&self, now: u32, course: &Course, starts: &Starts<R>) -> bool {
+        self.at >= course.pairs.len() || now == starts.ends[self.number]
     }
 
     /// Begins a new episode, where that is due.
-    fn begin<P: Player>(&mut self, walker: usize, now: u32, course: &Course, starts: &mut Starts<impl Rng>) {
-        if self.is_idle(walker, now, course, starts) {
-            *self = course.start::<P>(walker, now, starts);
+    fn begin<P: Player>(&mut self, now: u32, course: &Course, starts: &mut Starts<impl Rng>) {
+        if self.is_idle(now, course, starts) {
+            self.at = course.start::<P>(self.number, now, starts);
         }
     }
 
@@ -214,7 +217,6 @@ impl Walker {
     #[inline(always)]
     fn step<const SLIPS: bool, P: Player>(
         &mut self,
-        walker: usize,
         now: u32,
         course: &Course,
         player: &P,
@@ -224,9 +226,9 @@ impl Walker {
     ) -> Step {
         // That there is such a pair is asked once: there is none for the goal.
         let here = match course.pairs.get(self.at) {
-            Some(here) if now != starts.ends[walker] => here,
+            Some(here) if now != starts.ends[self.number] => here,
             _ => {
-                *self = course.start::<P>(walker, now, starts);
+                self.at = course.start::<P>(self.number, now, starts);
                 &course.pairs[self.at]
             }
         };
@@ -240,7 +242,7 @@ impl Walker {
             executed = if course.slip.outcome((bits >> 32) as u32) == 1 { other } else { passed };
         }
         self.at = usize::from(here.next[executed % ActionDraw::SETS]);
-        Step((pair * ACTIONS + action) as u32 + now.wrapping_sub(starts.began[walker]))
+        Step((pair * ACTIONS + action) as u32 + now.wrapping_sub(starts.began[self.number]))
     }
 }
 
@@ -282,35 +284,35 @@ impl Batch {
         let rounds = if is_much { wanted.div_ceil(WALKERS as u32) as usize } else { 0 };
         self.rows.resize(rounds, [Step::default(); WALKERS]);
         let before = luck.starts.drawn;
-        let [mut a, mut b, mut c, mut d] = [Walker::IDLE; WALKERS];
+        let [mut a, mut b, mut c, mut d] = std::array::from_fn(Walker::new);
         let mut now = 0u32;
         // A copy close at hand, which stays in registers.
         let mut steps = luck.steps.clone();
         for row in &mut self.rows {
             let bits = steps.next_u64();
-            row[0] = a.step::<SLIPS, P>(0, now, course, player, bits, &mut steps, &mut luck.starts);
+            row[0] = a.step::<SLIPS, P>(now, course, player, bits, &mut steps, &mut luck.starts);
             // Of 64 bits, two walkers take a half each where that is enough.
             let bits = if P::DRAWS { steps.next_u64() } else { bits >> 32 };
-            row[1] = b.step::<SLIPS, P>(1, now, course, player, bits, &mut steps, &mut luck.starts);
+            row[1] = b.step::<SLIPS, P>(now, course, player, bits, &mut steps, &mut luck.starts);
             let bits = steps.next_u64();
-            row[2] = c.step::<SLIPS, P>(2, now, course, player, bits, &mut steps, &mut luck.starts);
+            row[2] = c.step::<SLIPS, P>(now, course, player, bits, &mut steps, &mut luck.starts);
             let bits = if P::DRAWS { steps.next_u64() } else { bits >> 32 };
-            row[3] = d.step::<SLIPS, P>(3, now, course, player, bits, &mut steps, &mut luck.starts);
+            row[3] = d.step::<SLIPS, P>(now, course, player, bits, &mut steps, &mut luck.starts);
             now = now.wrapping_add(Step::TICK);
         }
         luck.steps = steps;
         let mut played = WALKERS * rounds;
         let mut walkers = [a, b, c, d];
-        walkers.iter_mut().enumerate().for_each(|(i, walker)| walker.begin::<P>(i, now, course, &mut luck.starts));
-        for (i, (walker, tail)) in walkers.iter_mut().zip(&mut self.tails).enumerate() {
+        walkers.iter_mut().for_each(|walker| walker.begin::<P>(now, course, &mut luck.starts));
+        for (walker, tail) in walkers.iter_mut().zip(&mut self.tails) {
             tail.clear();
             let mut now = now;
-            while luck.starts.began[i] != now || played < wanted as usize {
+            while luck.starts.began[walker.number] != now || played < wanted as usize {
                 let bits = luck.steps.next_u64();
-                tail.push(walker.step::<SLIPS, P>(i, now, course, player, bits, &mut luck.steps, &mut luck.starts));
+                tail.push(walker.step::<SLIPS, P>(now, course, player, bits, &mut luck.steps, &mut luck.starts));
                 now = now.wrapping_add(Step::TICK);
                 played += 1;
-                walker.begin::<P>(i, now, course, &mut luck.starts);
+                walker.begin::<P>(now, course, &mut luck.starts);
             }
         }
         // In the end each stands at a start that was drawn in vain.
@@ -329,9 +331,9 @@ impl Batch {
         self.tails.iter_mut().for_each(Vec::clear);
         let before = luck.starts.drawn;
         let tail = &mut self.tails[0];
-        let mut walker = Walker::IDLE;
+        let mut walker = Walker::new(0);
         let mut now = 0u32;
-        walker.begin::<Known>(0, now, course, &mut luck.starts);
+        walker.begin::<Known>(now, course, &mut luck.starts);
         while luck.starts.began[0] != now || tail.len() < wanted as usize {
             if luck.starts.began[0] == now {
                 player.begin();
@@ -340,14 +342,14 @@ impl Batch {
             let bits = luck.steps.next_u64();
             let known = Known(player.context(state, (bits >> 32) as u32));
             let step = if course.is_slippery {
-                walker.step::<true, _>(0, now, course, &known, bits, &mut luck.steps, &mut luck.starts)
+                walker.step::<true, _>(now, course, &known, bits, &mut luck.steps, &mut luck.starts)
             } else {
-                walker.step::<false, _>(0, now, course, &known, bits, &mut luck.steps, &mut luck.starts)
+                walker.step::<false, _>(now, course, &known, bits, &mut luck.steps, &mut luck.starts)
             };
             player.acted(state, step.entry() % ACTIONS);
             now = now.wrapping_add(Step::TICK);
             tail.push(step);
-            walker.begin::<Known>(0, now, course, &mut luck.starts);
+            walker.begin::<Known>(now, course, &mut luck.starts);
         }
         self.episodes = luck.starts.drawn.wrapping_sub(before) - 1;
     }

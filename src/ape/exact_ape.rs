@@ -147,7 +147,7 @@ impl Algorithm for ExactApe {
 
     /// β of the coming update. For a small β the experts that agree are a local optimum which gradients do not
     /// leave, while experts that were parted under a large β stay parted under a small one, at a better J. A
-    /// very large one, from the start, makes an expert give up. So a run starts at [`Self::PARTING_BETA`] and comes to
+    /// very large one, from the start, makes an expert give up. So a run starts at `PARTING_BETA` and comes to
     /// its own β over its first half.
     fn beta(&self) -> f64 {
         let Config { beta, alpha, exact_updates, .. } = self.experts.config;

@@ -23,8 +23,10 @@ pub struct Cell {
     value: f64,
     color: Option<Color32>,
     /// Made when somebody points at it.
-    hover: Option<Box<dyn FnOnce(&Ui) -> String>>,
+    hover: Option<Hint>,
 }
+
+type Hint = Box<dyn FnOnce(&Ui) -> String>;
 
 impl Cell {
     pub fn number(value: f64, text: String) -> Cell {

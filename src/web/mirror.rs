@@ -190,6 +190,7 @@ impl Elements {
             }
             stays
         });
+        #[expect(clippy::iter_over_hash_type, reason = "each container is arranged by itself")]
         for (container, inside) in &children {
             if self.children.get(container) == Some(inside) {
                 continue;
