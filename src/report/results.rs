@@ -412,10 +412,10 @@ fn benches(document: &mut Document, run: Run) -> Result<String, String> {
         let (bench, attacks) = bench(&file, &AttackerChoice::usual(), 1, run)?;
         let _ = writeln!(
             text,
-            "### {title}\n\nThe ensemble returns {} capped, {} within T; {} % arrive.",
+            "### {title}\n\nThe ensemble returns {} capped, {} within T; {} arrive.",
             number(bench.ensemble.capped_return, 2),
             number(bench.ensemble.horizon_return, 2),
-            number(100.0 * bench.ensemble.success, 1)
+            percent(bench.ensemble.success)
         );
         let head = words(&["cloner", "capped", "drop", "within T", "gap", "success", "pairs", "seconds"]);
         let steps = |value: Option<f64>| value.map_or("–".to_owned(), |value| number(value, 2));
