@@ -4,6 +4,7 @@ use std::cell::RefCell;
 use std::collections::VecDeque;
 use std::rc::Rc;
 
+use ape_lab::ape::Config;
 use ape_lab::experiment::{Setup, Task};
 use ape_lab::lab::{Command, Event, Hand, Link, PROTOCOL, Pool, Session, TaskEvent};
 use ape_lab::mdp::Grid;
@@ -56,7 +57,7 @@ pub fn check_events(grid: &mut Option<Grid>, events: &[Event]) {
             }
             Event::Exported(exported) => exported.check().expect("a session sends what can be saved"),
             Event::Refused(sentence) => assert!(sentence.len() < 2000, "{sentence}"),
-            Event::Remade(updates) => assert!(updates <= Config::MOST_UPDATES),
+            Event::Remade(updates) => assert!(*updates <= Config::MOST_UPDATES),
             Event::Ready { .. } => unreachable!("drivers say so"),
         }
     }

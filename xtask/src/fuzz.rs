@@ -27,13 +27,7 @@ pub fn fuzz(arguments: &[&str]) -> Result<(), Failure> {
         _ => return Err(USAGE.trim_end().to_owned()),
     };
     tools::install(&[Tool::CargoFuzz])?;
-    // The crates of the page in the versions of the page; cargo adds the few that only the fuzzer has.
-    let (ours, lock) = (root().join("Cargo.lock"), root().join("fuzz/Cargo.lock"));
-    let modified = |file: &Path| std::fs::metadata(file).and_then(|data| data.modified()).ok();
-    if modified(&lock) < modified(&ours) {
-        std::fs::copy(&ours, &lock).map_err(|error| format!("{}: {error}", lock.display()))?;
-    }
-    run("cargo", &["fmt", "--manifest-path", "fuzz/Cargo.toml", "--check"])?;
+    lock()?;
     say("building the fuzz targets (5 minutes at first)");
     run("cargo", &["fuzz", "build", "--sanitizer", "none"])?;
     let mut executions = Vec::new();
@@ -42,6 +36,27 @@ pub fn fuzz(arguments: &[&str]) -> Result<(), Failure> {
         executions.push((name, run_target(name, is_text, seconds)?));
     }
     executions.iter().for_each(|(name, executions)| println!("  {name:<12} {executions:>12} inputs"));
+    Ok(())
+}
+
+/// Whether what makes the input up still fits the program. Its crate has a library of C++ below it.
+pub fn check() -> Result<(), Failure> {
+    run("cargo", &["fmt", "--manifest-path", "fuzz/Cargo.toml", "--check"])?;
+    if ["c++", "g++", "clang++"].iter().all(|name| tools::output(name, &["--version"]).is_none()) {
+        println!("The fuzz targets were not compiled: there is no C++ compiler.");
+        return Ok(());
+    }
+    lock()?;
+    run("cargo", &["clippy", "--manifest-path", "fuzz/Cargo.toml", "--target-dir", "target", "--", "-D", "warnings"])
+}
+
+/// The crates of the page in the versions of the page; cargo adds the few that only the fuzzer has.
+fn lock() -> Result<(), Failure> {
+    let (ours, lock) = (root().join("Cargo.lock"), root().join("fuzz/Cargo.lock"));
+    let modified = |file: &Path| std::fs::metadata(file).and_then(|data| data.modified()).ok();
+    if modified(&lock) < modified(&ours) {
+        std::fs::copy(&ours, &lock).map_err(|error| format!("{}: {error}", lock.display()))?;
+    }
     Ok(())
 }
 

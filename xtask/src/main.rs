@@ -254,6 +254,7 @@ fn test(arguments: &[&str]) -> Result<(), Failure> {
         let page = ["clippy", "--no-default-features", "--features", "page", "--tests", "--lib", "--bins"];
         run("cargo", &[&page[..], &WASM, &DENY].concat())
     });
+    steps.step("fuzz-check", "2 minutes at first", &[Tool::RustComponents], fuzz::check);
     // The core must stand without the page: neither egui nor the command line.
     steps.step("core-alone", "a minute at first", &[], || run("cargo", &["check", "--lib", "--no-default-features"]));
     steps.step("doc", "2 minutes at first", &[], || {
