@@ -299,6 +299,15 @@ fn links_and_pipes_stay_what_they_are() {
     assert_eq!(new.metadata().unwrap().permissions().mode() & 0o777, 0o600);
 }
 
+/// What is known of one seed is a figure, and no spread.
+#[test]
+fn one_seed_has_no_spread() {
+    let sweep = ["sweep", "--betas", "0.6", "--total-steps", "4096", "--seeds"];
+    let lines = |seeds: &'static str| String::from_utf8(ape(&[&sweep[..], &[seeds]].concat()).stdout).unwrap();
+    let spreads = |text: &str| text.lines().filter(|line| line.contains("β = ") && line.contains('±')).count();
+    assert_eq!([spreads(&lines("1")), spreads(&lines("2"))], [0, 2]);
+}
+
 /// The figures that are printed and the file would write over each other.
 #[cfg(target_os = "linux")]
 #[test]

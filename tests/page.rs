@@ -1200,6 +1200,17 @@ fn old_results_say_that_they_are() {
     assert!(!says_so(&page, other) && !says_so(&page, "−144.76 ± 55.68"));
 }
 
+/// Two panels of one name would be one widget.
+#[test]
+fn a_link_shows_no_clone_twice() {
+    let desktop = Desktop::default();
+    desktop.visits.borrow_mut().push("v=1&clones=uniform;uniform".to_owned());
+    let (mut page, _) = open_with(1280.0, 800.0, desktop);
+    page.run_steps(6);
+    let sentence = text(&page, "This link cannot be read");
+    assert!(sentence.contains("clones=uniform;uniform: expected one cloner or two different ones"), "{sentence}");
+}
+
 /// A clone that could not be made is not waited for.
 #[test]
 fn a_slow_clone_that_fails_leaves_its_panel_with_a_sentence() {

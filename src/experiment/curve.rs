@@ -80,3 +80,26 @@ fn collected(grid: &Grid, policy: &Policy, horizon: u32, reward: &[[f64; ACTIONS
     let here = |state: usize| -> f64 { policy.row(state).iter().zip(&reward[state]).map(|(p, r)| p * r).sum() };
     grid.starts().iter().map(|&s| visits[s as usize] * here(s as usize)).sum()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ape::{AlgorithmKind, Config};
+    use crate::mdp::GridSpec;
+
+    /// Exact APE comes to its β over the first half of a run: a point tells the one that is climbed with.
+    #[test]
+    fn a_point_has_the_beta_of_the_coming_update() {
+        let config = Config { algorithm: AlgorithmKind::Exact, exact_updates: 4, beta: 0.1, ..Config::default() };
+        let mut trainer = Trainer::new(Grid::new(GridSpec::default()).unwrap(), config).unwrap();
+        let mut betas = vec![CurvePoint::of(&mut trainer).beta];
+        for _ in 0..3 {
+            trainer.update();
+            betas.push(CurvePoint::of(&mut trainer).beta);
+        }
+        assert!(
+            betas.iter().zip([0.6, 0.35, 0.1, 0.1]).all(|(found, expected)| (found - expected).abs() < 1e-12),
+            "{betas:?}"
+        );
+    }
+}

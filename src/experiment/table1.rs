@@ -79,7 +79,7 @@ pub struct Row {
 }
 
 impl Table1 {
-    /// What a table is made of, when no attackers are named: all of them.
+    /// A table of these cloners without a run yet.
     pub fn new(attackers: Vec<AttackerChoice>) -> Table1 {
         Table1 { attackers, runs: Vec::new() }
     }

@@ -98,7 +98,7 @@ fn percent(p: f64) -> String {
     if p < 1.0 - 1e-12 && p > 0.9995 { "> 99.9 %".to_owned() } else { format!("{} %", number(100.0 * p, 1)) }
 }
 
-/// The same, where the return is known.
+/// A figure over seeds, where it is known.
 fn known(of: &Option<Summary>) -> String {
     of.as_ref().map_or("–".to_owned(), summary)
 }

@@ -287,7 +287,7 @@ fn test(arguments: &[&str]) -> Result<(), Failure> {
     }
     // What is published is what is tested.
     steps.step("page", "3 minutes at first", &[], build);
-    steps.step("end-to-end", "7 minutes", &[Tool::Chromium, Tool::Node, Tool::NodePackages], || {
+    steps.step("end-to-end", "9 minutes", &[Tool::Chromium, Tool::Node, Tool::NodePackages], || {
         // Two at a time: a page alone leaves a core idle for half of the time.
         let mut command = program("node", &["--test", "--test-concurrency=2"]);
         command.args(end_to_end_tests()?);
