@@ -10,55 +10,62 @@
   const TURN = 1000 / 60;
   /** How long it rests at most: whatever is not heard of here shows after that. */
   const REST = 2000;
-  /** The frames that wait, eframe's and those of others, by names of our own: the browser's are positive. */
-  const waiting = new Map();
-  /** What the browser calls those that have waited and are to come. */
-  const called = new Map();
-  /** When the last frame came. */
-  let last = -Infinity;
+  /**
+   * The frames that were asked for, eframe's and those of others, by names of our own: what they call, and the browser's
+   * name of those that it was asked for. The others rest.
+   */
+  const frames = new Map();
+  /** When something was last painted. */
+  let painted = -Infinity;
   let names = 0;
   let awakeUntil = 0;
   /** Until then news is awaited: frames that nobody but egui asks for come after it. */
   let heldUntil = 0;
 
   /** Where somebody asks for it, every frame is measured (User Timing). What cannot be painted is not (faults.js). */
-  const measured = (callback) => (time) => {
+  function come(name, time) {
+    const frame = frames.get(name);
+    if (!frames.delete(name)) return;
+    const { callback, turn } = frame;
+    cancel(turn);
     if (!window.pageCanPaint()) return;
     const start = performance.now();
-    last = start;
     callback(time);
     if (window.apeLabMeasures) performance.measure("ape-lab: frame", { start, end: performance.now() });
-  };
+  }
+
+  /** Has a frame come with the screen's next turn. */
+  function ask(name, frame) {
+    frame.turn ??= request((time) => come(name, time));
+  }
 
   window.requestAnimationFrame = (callback) => {
     const now = performance.now();
-    if (now < awakeUntil && now >= heldUntil) return request(measured(callback));
     names -= 1;
-    waiting.set(names, callback);
-    restFor(now < heldUntil ? heldUntil - now : REST);
+    const frame = { callback, turn: undefined };
+    frames.set(names, frame);
+    if (now < heldUntil) rest.set(heldUntil - now);
+    else if (now < awakeUntil) ask(names, frame);
+    else rest.set(REST);
     return names;
   };
 
-  window.cancelAnimationFrame = (frame) => {
-    if (waiting.delete(frame)) return;
-    cancel(called.get(frame) ?? frame);
-    called.delete(frame);
+  window.cancelAnimationFrame = (name) => {
+    const frame = frames.get(name);
+    cancel(frame ? frame.turn : name);
+    frames.delete(name);
   };
 
   function wake(stay) {
     const now = performance.now();
     awakeUntil = Math.max(awakeUntil, now + stay);
-    for (const [name, callback] of waiting) {
-      const frame = measured(callback);
-      const come = (time) => {
-        cancel(called.get(name));
-        if (called.delete(name)) frame(time);
-      };
-      called.set(name, request(come));
-      // After a rest it need not wait for the screen's next turn, but what woke it is to be heard first.
-      if (now - last > TURN && document.visibilityState === "visible") soon(come);
+    rest.stop();
+    // Where nothing was painted in this turn of the screen, nothing waits for the next; but what woke it is to be heard first.
+    const isFree = now - painted > TURN && document.visibilityState === "visible";
+    for (const [name, frame] of frames) {
+      ask(name, frame);
+      if (isFree) soon((time) => come(name, time));
     }
-    waiting.clear();
   }
 
   const channel = new MessageChannel();
@@ -71,30 +78,45 @@
     channel.port2.postMessage(undefined);
   }
 
-  /** A timer that wakes at the earliest time it is set to. */
+  /** A timer that wakes at the earliest time it is set to, unless it is stopped before. */
   function alarm() {
     let timer;
     let at = Infinity;
-    return (delay) => {
+    function set(delay) {
       const then = performance.now() + delay;
       if (then >= at) return;
-      clearTimeout(timer);
+      stop();
       at = then;
-      timer = setTimeout(() => {
-        at = Infinity;
-        wake(SHORT);
-      }, delay);
-    };
+      timer = setTimeout(ring, delay);
+    }
+    function stop() {
+      clearTimeout(timer);
+      at = Infinity;
+    }
+    function ring() {
+      at = Infinity;
+      const now = performance.now();
+      if (now < heldUntil) set(heldUntil - now);
+      else wake(SHORT);
+    }
+    return { set, stop };
   }
 
-  // Two of them: where a rest ends there need be nothing to paint yet.
-  const wakeIn = alarm();
-  const restFor = alarm();
+  /** When egui wants to paint again. */
+  const wish = alarm();
+  /** When a rest is over; there need be nothing to paint then. */
+  const rest = alarm();
   /** What a timer can be set to. */
   const MOST = 2 ** 31 - 1;
 
   /** There will be something to paint in so many milliseconds (src/web/page.rs). */
-  window.wakePage = (delay) => (delay > 0 ? wakeIn(Math.min(delay, MOST)) : wake(LONG));
+  window.wakePage = (delay) => (delay > 0 ? wish.set(Math.min(delay, MOST)) : wake(LONG));
+
+  /** It begins to paint (src/web/page.rs); what it will wish for after that, it says anew. */
+  window.pagePaints = () => {
+    painted = performance.now();
+    wish.stop();
+  };
 
   /** There will be news in so many milliseconds, or later (src/web/worker.rs). */
   window.holdPage = (most) => (heldUntil = performance.now() + most);

@@ -13,8 +13,8 @@ use crate::experiment::{PRESETS, Setup};
 use crate::lab::{Command, RunState};
 use crate::mdp::{Grid, RETURN_KINDS};
 
-/// Least time between two changes of the address, in seconds: browsers refuse more.
-const PAUSE: f64 = 0.5;
+/// Least time between two changes of the address, in seconds: there are browsers that refuse more than a hundred in thirty.
+const PAUSE: f64 = 0.35;
 /// Why nothing is copied where [`super::Host::can_copy`] says no.
 pub(super) const NO_CLIPBOARD: &str = "The browser lets only pages that come over https copy something.";
 /// Turns of β that a link holds.
@@ -85,15 +85,18 @@ impl App {
         if self.shown.is_none() {
             return;
         }
-        let wait = self.address.1 + PAUSE - self.now;
+        let fragment = self.fragment();
+        if fragment == self.address.0 {
+            return;
+        }
+        // A run that was just asked for mostly ends before, and comes into the address with its digest.
+        let last = if self.is_retraining() { self.address.1.max(self.asked_at) } else { self.address.1 };
+        let wait = last + PAUSE - self.now;
         if wait > 0.0 {
             return ctx.request_repaint_after_secs(wait as f32);
         }
-        let fragment = self.fragment();
-        if fragment != self.address.0 {
-            self.host.set_address(&fragment);
-            self.address = (fragment, self.now);
-        }
+        self.host.set_address(&fragment);
+        self.address = (fragment, self.now);
     }
 
     pub(super) fn copy_link(&mut self, ctx: &Context) {

@@ -134,6 +134,8 @@ pub struct App {
     /// When it was started again by itself.
     restarts: Vec<f64>,
     asked: Asked,
+    /// When.
+    pub(super) asked_at: f64,
     /// Whether that run is to play once it has begun.
     plays: bool,
     /// A β that the run is to go on with, and the last snapshot that may have been made before the session heard of it.
@@ -238,6 +240,7 @@ impl App {
             session: Session::Starting,
             restarts: Vec::new(),
             asked: Asked::Nothing,
+            asked_at: 0.0,
             plays: true,
             continued: None,
             silence: 0.0,
@@ -372,7 +375,7 @@ impl App {
         }
         if matches!(self.session, Session::Ready) {
             if matches!(command, Command::Load { .. } | Command::Retrain { .. }) {
-                self.asked = Asked::Waits;
+                (self.asked, self.asked_at) = (Asked::Waits, self.now);
             }
             if matches!(command, Command::Play | Command::Step) {
                 // It goes there first, and on at once: that moment may never be seen.

@@ -96,7 +96,8 @@ impl Pen {
             mesh.add_triangle(first, first + 1, first + 2);
             mesh.add_triangle(first + 1, first + 2, first + 3);
         };
-        let mut shafts = [Rect::NOTHING; ACTIONS];
+        // Two opposite arrows have one shaft.
+        let (mut upright, mut level) = (Rect::NOTHING, Rect::NOTHING);
         for (action, &p) in Action::ALL.into_iter().zip(policy) {
             // What is rarer than one time in thirty would be a speck.
             if p < 0.03 {
@@ -111,10 +112,12 @@ impl Pen {
             let head = size * 0.16 * p.sqrt().min(2.0 * p);
             let neck = center + along * (size * 0.46 * p - head);
             let side = along.rot90().abs() * half;
-            shafts[action as usize] = Rect::from_two_pos(center - side, neck + side);
+            let shaft = Rect::from_two_pos(center - side, neck + side);
+            let shafts = if down == 0 { &mut level } else { &mut upright };
+            *shafts = shafts.union(shaft);
             stamp(&self.heads, head, neck + along * head / 2.0, along);
         }
-        for &shaft in shafts.iter().filter(|shaft| shaft.is_positive()) {
+        for shaft in [upright, level].into_iter().filter(Rect::is_positive) {
             mesh.add_colored_rect(shaft, ink);
         }
     }

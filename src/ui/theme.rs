@@ -198,7 +198,8 @@ fn visuals(theme: Theme) -> Visuals {
     visuals.slider_trailing_fill = true;
     visuals.selection.bg_fill = palette.accent;
     visuals.selection.stroke = Stroke::new(1.5, palette.on_accent);
-    let radius = CornerRadius::same(6);
+    // From 5 on egui draws a corner with twice as many triangles.
+    let radius = CornerRadius::same(4);
     visuals.window_corner_radius = CornerRadius::same(10);
     visuals.menu_corner_radius = CornerRadius::same(8);
     let widgets = &mut visuals.widgets;

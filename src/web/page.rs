@@ -31,6 +31,10 @@ extern "C" {
     #[wasm_bindgen(js_name = wakePage)]
     fn wake_page(delay: f64);
 
+    /// Says that a frame begins (web/rest.js).
+    #[wasm_bindgen(js_name = pagePaints)]
+    fn page_paints();
+
     /// Nothing is painted while this canvas has lost its graphics (web/faults.js).
     #[wasm_bindgen(js_name = watchGraphics)]
     fn watch_graphics(canvas: &HtmlCanvasElement);
@@ -197,6 +201,11 @@ impl OnStage {
 }
 
 impl eframe::App for OnStage {
+    /// Once a frame, before all else.
+    fn raw_input_hook(&mut self, _ctx: &Context, _input: &mut egui::RawInput) {
+        page_paints();
+    }
+
     fn logic(&mut self, ctx: &Context, frame: &mut eframe::Frame) {
         self.with(|app| app.logic(ctx, frame));
     }

@@ -23,7 +23,7 @@ const SESSION: &str = "session";
 const TASKS: &str = "tasks";
 
 /// How long the page paints nothing but what its visitor does, to leave the machine to a retraining, in milliseconds.
-const HOLD: f64 = 100.0;
+const HOLD: f64 = 200.0;
 
 #[wasm_bindgen]
 extern "C" {

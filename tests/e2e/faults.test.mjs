@@ -100,13 +100,14 @@ const watched = (page) =>
 async function panic(page) {
   await page.workers().at(-1).evaluate(() => {
     self.addEventListener("error", (event) => event.preventDefault());
+    // Whatever it is told next; the page may have nothing to tell.
+    const next = () => self.dispatchEvent(new MessageEvent("message", { data: "nothing" }));
+    self.addEventListener("error", next, { once: true });
     performance.now = () => {
       delete performance.now;
       throw new Error("no clock");
     };
   });
-  // Whatever it is told next.
-  await page.evaluate(() => window.watch.workers.at(-1).postMessage("nothing"));
 }
 
 for (const [fault, sentence, cause] of [
