@@ -56,15 +56,17 @@
     frames.delete(name);
   };
 
-  function wake(stay) {
+  function wake(stay, isVisitor = false) {
     const now = performance.now();
     awakeUntil = Math.max(awakeUntil, now + stay);
     rest.stop();
-    // Where nothing was painted in this turn of the screen, nothing waits for the next; but what woke it is to be heard first.
+    // Where nothing was painted in this turn of the screen, neither the visitor nor what comes after a rest waits for the next;
+    // but what woke it is to be heard first.
     const isFree = now - painted > TURN && document.visibilityState === "visible";
     for (const [name, frame] of frames) {
+      const isNext = isFree && (isVisitor || frame.turn === undefined);
       ask(name, frame);
-      if (isFree) soon((time) => come(name, time));
+      if (isNext) soon((time) => come(name, time));
     }
   }
 
@@ -136,7 +138,7 @@
   for (const kind of HAPPENINGS.split(" ")) {
     // That a key is let go is nothing to be seen.
     const isHeld = () => kind === "keyup" && performance.now() < heldUntil;
-    window.addEventListener(kind, () => isHeld() || wake(LONG), { capture: true, passive: true });
+    window.addEventListener(kind, () => isHeld() || wake(LONG, true), { capture: true, passive: true });
   }
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => wake(LONG));
 })();
