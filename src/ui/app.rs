@@ -134,7 +134,7 @@ pub struct App {
     /// When it was started again by itself.
     restarts: Vec<f64>,
     asked: Asked,
-    /// When.
+    /// When it was asked for, on the page's clock, in seconds.
     pub(super) asked_at: f64,
     /// Whether that run is to play once it has begun.
     plays: bool,
